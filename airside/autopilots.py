@@ -1,0 +1,193 @@
+"""The autopilots of a process as plain arrays, a row each, and the stages of their tick.
+
+A tick is ``sense -> hear -> refer -> control -> actuate -> tell -> report``; see `process` for the stages that touch
+sockets. No stage reads a wall clock.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.flight_path import Own
+from ftcc.airside.references.profiles import new_profile_state, profile_arrays, refer
+from ftcc.airside.scheme import Reference, Scheme
+from ftcc.airside.schemes import find
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.channel import Channel, Inbox, new_inbox
+from ftcc.link.compiled import compiled, copy, instantiate
+from ftcc.link.timing import Timing
+
+__all__ = ["Autopilots", "LinkEvents", "build", "lead", "link_events", "set_links", "tick_of"]
+
+
+class Autopilots(NamedTuple):
+    """k autopilots of one scheme."""
+
+    own: NDArray[np.float64]
+    """(k, 18): see `Own`."""
+    reference: NDArray[np.float64]
+    """(k, 6): see `Reference`."""
+    state: NDArray[np.float64]
+    """(k, n): the scheme's ``State``."""
+    output: NDArray[np.float64]
+    """(k, n): the scheme's ``Output`` of the last step."""
+    started: NDArray[np.int64]
+    """(k,): 1 once the law has its initial state."""
+    gains: NDArray[np.float64]
+    """(k, n): the scheme's ``Gains``."""
+    model: NDArray[np.float64]
+    """(k, 21): see `Model`."""
+    weight: NDArray[np.float64]
+    """(k, n): a_ij of the in-edges."""
+    leader: NDArray[np.int64]
+    """(k,): 1 for a leader."""
+    command: NDArray[np.float64]
+    """(k, 4): command in the order of ``ACTUATORS``."""
+    target: NDArray[np.float64]
+    """(k, 7): a leader's target (stamp s, x, y, z, vx, vy, vz), z up."""
+    shared: NDArray[np.float64]
+    """(k, m): what the neighbours are told."""
+    signals: NDArray[np.float64]
+    """(k, n): the scheme's ``SIGNALS``; nan for a leader."""
+    travel: NDArray[np.float64]
+    """(k, 4): full deflection of the actuators."""
+    offset: NDArray[np.float64]
+    """(k,): lateral position, m."""
+    profile: NDArray[np.float64]
+    """(k, 15): parameters of the leaders' profiles."""
+    profile_commands: NDArray[np.float64]
+    """(k, n, 3): their commands; unused rows have time inf."""
+    profile_state: NDArray[np.float64]
+    """(k, 5)."""
+    leader_shares: NDArray[np.int64]
+    """(m,): which entries of `Reference` a leader shares; -1 = unused."""
+    actuator: NDArray[np.int64]
+    """(n,): index into ``ACTUATORS`` of each of the scheme's commands."""
+
+
+class LinkEvents(NamedTuple):
+    """Changes of the links of a process's UAVs, in order of time."""
+
+    at_us: NDArray[np.int64]
+    """(n,)."""
+    uav: NDArray[np.int64]
+    """(n,): index of the UAV in the process."""
+    edge: NDArray[np.int64]
+    """(n,): its in-edge, or -1 for its own radio."""
+    quality: NDArray[np.float64]
+    """(n, 7): see `Channel`."""
+    position: NDArray[np.int64]
+    """(1,): the next event."""
+    radio_on: NDArray[np.int64]
+    """(k,): 0 while a UAV's own radio is off."""
+
+
+@functools.cache
+def tick_of(scheme: str) -> ModuleType:
+    """The compiled tick of a scheme, by name."""
+    return instantiate("ftcc.airside.tick", scheme, scheme=find(scheme).module)
+
+
+def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, Inbox]:
+    """Arrays for ``specs``, which share one scheme, before the first tick."""
+    scheme: Scheme = find(specs[0].scheme)
+    k = len(specs)
+    width = scheme.shared_width
+    profiles = [profile_arrays(spec.profile, timing.period) if spec.profile else None for spec in specs]
+    rows = max([1] + [len(pair[1]) for pair in profiles if pair])
+    commands = np.full((k, rows, 3), math.inf)
+    parameters = np.zeros((k, 15))
+    states = np.zeros((k, 5))
+    for i, (spec, pair) in enumerate(zip(specs, profiles, strict=True)):
+        if pair and spec.profile:
+            parameters[i], commands[i, : len(pair[1])] = pair
+            states[i] = new_profile_state(spec.profile)
+    inbox = new_inbox([[n.uav for n in spec.neighbours] for spec in specs], [s.uav for s in specs], width, Channel())
+    weight = np.zeros(inbox.valid.shape)
+    for i, spec in enumerate(specs):
+        inbox.quality[i, :] = spec.channel
+        weight[i, : len(spec.neighbours)] = [n.weight for n in spec.neighbours]
+    shares = [Reference._fields.index(quantity.name) for quantity in scheme.shared.get("leader", ())]
+    leader = np.array([spec.role == "leader" for spec in specs], np.int64)
+    signals = np.zeros((k, len(scheme.signals)))
+    signals[leader == 1] = math.nan
+    return (
+        Autopilots(
+            own=np.zeros((k, len(Own._fields))),
+            reference=np.array([spec.mission for spec in specs], np.float64),
+            state=np.zeros((k, len(scheme.module.State._fields))),
+            output=np.zeros((k, len(scheme.module.Output._fields))),
+            started=np.zeros(k, np.int64),
+            gains=np.array([spec.gains for spec in specs], np.float64),
+            model=np.array([spec.model for spec in specs], np.float64),
+            weight=weight,
+            leader=leader,
+            command=np.zeros((k, 4)),
+            target=np.zeros((k, 7)),
+            shared=np.zeros((k, width)),
+            signals=signals,
+            travel=np.array([spec.travel for spec in specs], np.float64),
+            offset=np.array([spec.offset for spec in specs], np.float64),
+            profile=parameters,
+            profile_commands=commands,
+            profile_state=states,
+            leader_shares=np.array(shares + [-1] * (width - len(shares)), np.int64),
+            actuator=np.array([ACTUATORS.index(name) for name in scheme.commands], np.int64),
+        ),
+        inbox,
+    )
+
+
+def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
+    """The link events of ``specs`` in one table, in order of time."""
+    rows = sorted(
+        (event.at_us, i, -1 if event.sender is None else [n.uav for n in spec.neighbours].index(event.sender), event)
+        for i, spec in enumerate(specs)
+        for event in spec.link_events
+    )
+    return LinkEvents(
+        at_us=np.array([row[0] for row in rows], np.int64),
+        uav=np.array([row[1] for row in rows], np.int64),
+        edge=np.array([row[2] for row in rows], np.int64),
+        quality=np.array([row[3].channel for row in rows], np.float64).reshape(len(rows), len(Channel._fields)),
+        position=np.zeros(1, np.int64),
+        radio_on=np.ones(len(specs), np.int64),
+    )
+
+
+@compiled
+def set_links(events, inbox, now_us):  # type: ignore[no-untyped-def]
+    """Bring all link events up to ``now_us`` into force."""
+    while events.position[0] < events.at_us.shape[0] and events.at_us[events.position[0]] <= now_us:
+        n = events.position[0]
+        i = events.uav[n]
+        if events.edge[n] < 0:
+            events.radio_on[i] = 0 if events.quality[n, 6] > 0.0 else 1
+        else:
+            copy(events.quality[n], inbox.quality[i, events.edge[n]])
+        events.position[0] += 1
+
+
+@compiled
+def lead(autopilots, i, now_us, period_us):  # type: ignore[no-untyped-def]
+    """A leader's tick: advance the profile of UAV ``i``, set its target and what it shares."""
+    reference = autopilots.reference[i]
+    refer(
+        autopilots.profile[i], autopilots.profile_commands[i], autopilots.profile_state[i], reference, now_us, period_us
+    )
+    V, z_dot = reference[1], reference[4]
+    target = autopilots.target[i]
+    target[0] = now_us / 1e6
+    target[1], target[2], target[3] = reference[0], autopilots.offset[i], reference[3]
+    target[4], target[5], target[6] = math.sqrt(max(V * V - z_dot * z_dot, 0.0)), 0.0, z_dot
+    for m in range(autopilots.shared.shape[1]):
+        source = autopilots.leader_shares[m]
+        autopilots.shared[i, m] = reference[source] if source >= 0 else 0.0

@@ -1,0 +1,70 @@
+"""The nominal model that a law knows: control-oriented longitudinal dynamics and the limits of its actuators.
+
+No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the monograph does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ftcc.link.compiled import compiled
+
+__all__ = ["Model", "airspeed_model", "clip", "flight_path_model", "pitch_rate_model"]
+
+
+class Model(NamedTuple):
+    """Nominal parameters (SI units, rad) and limits."""
+
+    m: float
+    S: float
+    c: float
+    Iy: float
+    rho: float
+    g: float
+    CD0: float
+    CDa: float
+    CDa2: float
+    CL0: float
+    CLa: float
+    CLde: float
+    Cm0: float
+    Cma: float
+    Cmde: float
+    Cmq: float
+    thrust_min: float
+    thrust_max: float
+    elevator_min: float
+    elevator_max: float
+    lag: float
+    """Bandwidth of the actuators, rad/s; 0 = none."""
+
+
+@compiled
+def clip(value: float, low: float, high: float) -> float:
+    """``value`` limited to [low, high]."""
+    return min(max(value, low), high)
+
+
+@compiled
+def airspeed_model(V, gamma, alpha, a):  # type: ignore[no-untyped-def]
+    """f_v (m/s^2) and g_v (1/kg) of V' = f_v + g_v T; abs(alpha) is taken as at most 1 rad in g_v."""
+    lifting = 0.5 * a.rho * V * V * a.S
+    drift = -lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha) / a.m - a.g * math.sin(gamma)
+    return drift, math.cos(clip(alpha, -1.0, 1.0)) / a.m
+
+
+@compiled
+def flight_path_model(V, gamma, divisor, a):  # type: ignore[no-untyped-def]
+    """f_g (rad/s) and g_g (1/s) of gamma' = f_g + g_g theta; ``divisor`` is the airspeed guarded against zero."""
+    lifting = 0.5 * a.rho * V * V * a.S
+    drift = (-a.m * a.g * math.cos(gamma) + lifting * a.CL0 - lifting * a.CLa * gamma) / (a.m * divisor)
+    return drift, lifting * a.CLa / (a.m * divisor)
+
+
+@compiled
+def pitch_rate_model(V, alpha, q, divisor, a):  # type: ignore[no-untyped-def]
+    """f_q (rad/s^2) and g_q (1/s^2) of q' = f_q + g_q elevator."""
+    moment = 0.5 * a.rho * V * V * a.S * a.c / a.Iy
+    drift = moment * (a.Cm0 + a.Cma * alpha + a.Cmq * a.c * q / (2.0 * divisor))
+    return drift, moment * a.Cmde

@@ -1,0 +1,197 @@
+"""What a scheme (control law) is made of: the vocabulary that scheme files use and the rest of the product reads."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.graph import Assumption, Graph
+
+__all__ = [
+    "Flight",
+    "Heard",
+    "Problem",
+    "Quantity",
+    "Reference",
+    "Scheme",
+    "quantities",
+]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Name, unit and meaning of a number; used as annotation of gains and states and to list signals.
+
+    ``published`` is the monograph's value of a gain, None where the monograph has none. ``bound`` names the signal
+    (or gives the constant) that limits this one, for display.
+    """
+
+    name: str
+    unit: str
+    meaning: str = ""
+    published: float | None = None
+    bound: float | str | None = None
+
+
+class Heard(NamedTuple):
+    """What a UAV has heard of its n neighbours, a row each."""
+
+    values: NDArray[np.float64]
+    """(n, m): shared values of the newest usable record, in the order of ``SHARED``."""
+    age: NDArray[np.float64]
+    """(n,): present time minus stamp, s, never negative."""
+    valid: NDArray[np.float64]
+    """(n,): 1 once the neighbour has been heard."""
+    weight: NDArray[np.float64]
+    """(n,): a_ij."""
+
+
+class Reference(NamedTuple):
+    """Commanded motion in the vertical plane: a leader's profile, or the mission constants that followers know."""
+
+    x: float
+    """Forward position, m."""
+    V: float
+    """Airspeed, m/s."""
+    V_dot: float
+    """m/s^2."""
+    z: float
+    """Altitude, m."""
+    z_dot: float
+    """m/s."""
+    z_ddot: float
+    """m/s^2."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What is known before take-off, for a scheme's ``check``."""
+
+    graph: Graph
+    period: float
+    """Control period, s."""
+    exchange_period: float
+    """s."""
+    latency: float
+    """Link latency, s."""
+    leader_climb: float
+    """Largest abs(climb rate) of the leaders' profiles, m/s."""
+    leader_speed_varies: bool
+    initial: Mapping[int, Reference] = field(default_factory=dict)
+    """Initial speed and altitude of each follower, by id."""
+
+
+class Problem(NamedTuple):
+    """A finding of a check: ``fatal`` ones refuse the flight, others warn."""
+
+    fatal: bool
+    text: str
+
+
+def quantities(record: Any) -> dict[str, Quantity]:
+    """The `Quantity` that annotates each field of the NamedTuple class ``record``, by field name."""
+    found = {}
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        for note in getattr(hint, "__metadata__", ()):
+            if isinstance(note, Quantity):
+                found[name] = note
+    return found
+
+
+_REQUIRED = ("Gains", "State", "Output", "SHARED", "SIGNALS", "GRAPH", "COMMANDS", "PLANT", "FORMS", "SWITCHES")
+_FUNCTIONS = ("start", "step", "share", "observe", "check")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A scheme file, checked for completeness."""
+
+    name: str
+    module: ModuleType
+
+    def __post_init__(self) -> None:
+        missing = [name for name in _REQUIRED + _FUNCTIONS if not hasattr(self.module, name)]
+        if missing:
+            raise TypeError(f"scheme {self.name} ({self.module.__name__}) lacks {', '.join(missing)}")
+        missing = [name for name in self.gains_type._fields if name not in quantities(self.gains_type)]
+        if missing:
+            raise TypeError(f"scheme {self.name}: gains {', '.join(missing)} have no Quantity")
+
+    @property
+    def title(self) -> str:
+        return (self.module.__doc__ or self.name).strip().splitlines()[0].rstrip(".")
+
+    @property
+    def gains_type(self) -> Any:
+        return self.module.Gains
+
+    @property
+    def graph(self) -> Assumption:
+        return self.module.GRAPH  # type: ignore[no-any-return]
+
+    @property
+    def plant(self) -> str:
+        return self.module.PLANT  # type: ignore[no-any-return]
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        return self.module.COMMANDS  # type: ignore[no-any-return]
+
+    @property
+    def shared(self) -> dict[str, tuple[Quantity, ...]]:
+        return self.module.SHARED  # type: ignore[no-any-return]
+
+    @property
+    def signals(self) -> tuple[Quantity, ...]:
+        return self.module.SIGNALS  # type: ignore[no-any-return]
+
+    @property
+    def forms(self) -> dict[str, dict[str, float]]:
+        return self.module.FORMS  # type: ignore[no-any-return]
+
+    @property
+    def switches(self) -> dict[str, dict[str, float]]:
+        return self.module.SWITCHES  # type: ignore[no-any-return]
+
+    @property
+    def shared_width(self) -> int:
+        return max(len(row) for row in self.shared.values())
+
+    @property
+    def check(self) -> Callable[..., list[Problem]]:
+        return self.module.check  # type: ignore[no-any-return]
+
+    def gains(self, form: str, overrides: Mapping[str, float]) -> Any:
+        """The gains of a form with overrides: published values, then the form's own, then ``overrides``.
+
+        Raises
+        ------
+        ValueError
+            For an unknown form or gain, a value that is not finite, or a gain that nobody gave a value.
+        """
+        if form not in self.forms:
+            raise ValueError(f"scheme {self.name} has no form {form!r}; it has {', '.join(self.forms)}")
+        known = quantities(self.gains_type)
+        values = {name: note.published for name, note in known.items()} | self.forms[form]
+        for name, value in overrides.items():
+            if name not in known:
+                raise ValueError(f"scheme {self.name} has no gain {name!r}; it has {', '.join(known)}")
+            if not math.isfinite(value):
+                raise ValueError(f"gain {name} = {value}: must be a finite number")
+            values[name] = value
+        unset = [name for name, value in values.items() if value is None]
+        if unset:
+            raise ValueError(f"gains {', '.join(unset)} have no published value and must be given")
+        return self.gains_type(**{name: float(value) for name, value in values.items() if value is not None})
+
+
+def load(name: str, module: str) -> Scheme:
+    """Import a scheme's module and check it."""
+    return Scheme(name, importlib.import_module(module))

@@ -1,0 +1,376 @@
+"""Distributed fault-tolerant containment control with several leaders.
+
+Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, chapter 5;
+equation numbers are the monograph's. Each follower estimates, from its neighbours' estimates alone, one altitude in the
+convex hull of the leaders' altitudes and tracks it and the common speed in spite of elevator faults, disturbances and
+saturation.
+
+Departures from the printed law, each a gain that the `monograph` form leaves off:
+- a reference shaper between observer and tracking law, and extrapolation of neighbours by the rate they send: the
+  printed law does not survive neighbour values that are held between messages;
+- the auxiliary signal left out of the pitch-rate reference (kappa = 0): with it, deep saturation loses the aircraft;
+- a limit on the altitude error that the law sees, with conditional integration: the printed law's region of
+  attraction ends between 0.5 and 1 m;
+- disturbance observers fed with the command that acts, not with the one just computed (gains of fast actuators only);
+- f_iq0 in (5.29) is read as f_iq; sign() is tanh(./phi) (Remark 5.6).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
+from ftcc.airside.elements.observers import disturbance_observer_rate, extrapolated, sliding_mode_observer
+from ftcc.airside.elements.saturation import linear_auxiliary_rate
+from ftcc.airside.flight_path import Own
+from ftcc.airside.model import Model, airspeed_model, clip, flight_path_model, pitch_rate_model
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
+from ftcc.link.compiled import compiled
+from ftcc.link.graph import Assumption
+
+__all__ = ["Gains", "Output", "State", "check", "observe", "share", "start", "step"]
+
+Q = Quantity
+
+
+class Gains(NamedTuple):
+    """Design parameters, then switches (0 or 1) and settings of the additions."""
+
+    k11: Annotated[float, Q("k11", "1/s", "altitude error", 7.3)]
+    k12: Annotated[float, Q("k12", "1/s^2", "integral of the altitude error", 24.1)]
+    k21: Annotated[float, Q("k21", "1/s", "flight-path error", 2.2)]
+    k31: Annotated[float, Q("k31", "1/s", "pitch error", 14.0)]
+    k41: Annotated[float, Q("k41", "1/s", "pitch-rate error", 39.0)]
+    k51: Annotated[float, Q("k51", "1/s", "speed error", 5.4)]
+    k22: Annotated[float, Q("k22", "1/s", "observer of the flight-path disturbance", 6.4)]
+    k42: Annotated[float, Q("k42", "1/s", "observer of the lumped pitch disturbance", 46.0)]
+    k52: Annotated[float, Q("k52", "1/s", "observer of the speed disturbance", 12.1)]
+    e1: Annotated[float, Q("epsilon_1", "s", "time constant of the first high-gain observer", 0.01)]
+    e2: Annotated[float, Q("epsilon_2", "s", "time constant of the second high-gain observer", 0.01)]
+    l1: Annotated[float, Q("l_1", "-", "damping of the first high-gain observer", 2.0)]
+    l2: Annotated[float, Q("l_2", "-", "damping of the second high-gain observer", 2.0)]
+    beta1: Annotated[float, Q("beta_1", "1/s", "distributed observer, linear", 8.0)]
+    beta2: Annotated[float, Q("beta_2", "m/s", "distributed observer, sliding mode", 3.0)]
+    phi: Annotated[float, Q("phi", "m", "boundary layer of the distributed observer (chosen)", 0.1)]
+    kappa: Annotated[float, Q("kappa", "-", "share of zeta1 in the pitch-rate reference", 1.0)]
+    observers: Annotated[float, Q("observers", "-", "1: disturbance observers on", 1.0)]
+    auxiliary: Annotated[float, Q("auxiliary", "-", "1: auxiliary systems on", 1.0)]
+    acting: Annotated[float, Q("acting", "-", "1: observers see the command in force (not in paper)", 0.0)]
+    shaper: Annotated[float, Q("w", "rad/s", "pole of the reference shaper, 0: off (not in paper)", 0.0)]
+    v_max: Annotated[float, Q("v_max", "m/s", "largest climb rate of the shaper (not in paper)", 2.5)]
+    a_max: Annotated[float, Q("a_max", "m/s^2", "largest acceleration of the shaper (not in paper)", 1.0)]
+    guard: Annotated[float, Q("c", "m", "limit on the altitude error seen, 0: off (not in paper)", 0.0)]
+    horizon: Annotated[float, Q("horizon", "s", "longest extrapolation of a neighbour (not in paper)", 0.0)]
+    substeps: Annotated[float, Q("n", "-", "Euler steps per tick", 1.0)]
+    in_flight: Annotated[float, Q("in_flight", "-", "1: start from the present state; 0: the published zeros", 0.0)]
+    z_start: Annotated[float, Q("z_start", "m", "altitude assumed of everybody at the published start", 1000.0)]
+
+
+class State(NamedTuple):
+    """Internal states of one follower."""
+
+    zhat: Annotated[float, Q("zhat", "m", "estimated altitude reference")]
+    integral: Annotated[float, Q("I", "m s", "integral of S1")]
+    xi1: Annotated[float, Q("xi1", "rad/s", "observer of d2")]
+    xi2: Annotated[float, Q("xi2", "rad/s^2", "observer of the lumped pitch disturbance")]
+    xi3: Annotated[float, Q("xi3", "m/s^2", "observer of d1")]
+    theta_d: Annotated[float, Q("theta_d", "rad", "high-gain observer 1")]
+    p1: Annotated[float, Q("p1", "rad", "its rate times epsilon_1")]
+    q_d: Annotated[float, Q("q_d", "rad/s", "high-gain observer 2")]
+    p2: Annotated[float, Q("p2", "rad/s", "its rate times epsilon_2")]
+    zeta1: Annotated[float, Q("zeta1", "rad/s", "auxiliary system of the elevator")]
+    zeta2: Annotated[float, Q("zeta2", "m/s", "auxiliary system of the thrust")]
+    z_r: Annotated[float, Q("z_r", "m", "shaped reference")]
+    v_r: Annotated[float, Q("v_r", "m/s", "its rate")]
+    a_r: Annotated[float, Q("a_r", "m/s^2", "its acceleration")]
+
+
+class Output(NamedTuple):
+    """Commands first, then what else one evaluation of the law shows."""
+
+    thrust: float
+    elevator: float
+    zhat_rate: float
+    S1: float
+    S5: float
+    gamma_d: float
+    d1_hat: float
+    d2_hat: float
+    lumped_hat: float
+    elevator_wanted: float
+    thrust_wanted: float
+
+
+SHARED = {
+    "follower": (Q("zhat", "m", "estimated altitude reference"), Q("v", "m/s", "rate of the reference")),
+    "leader": (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate"), Q("V", "m/s"), Q("V_dot", "m/s^2")),
+}
+SIGNALS = (
+    Q("zhat", "m", "estimated altitude reference"),
+    Q("z_r", "m", "altitude reference that the law tracks"),
+    Q("S1", "m", "altitude tracking error"),
+    Q("S5", "m/s", "speed tracking error"),
+    Q("gamma_d", "rad", "commanded flight-path angle"),
+    Q("theta_d", "rad", "commanded pitch"),
+    Q("q_d", "rad/s", "commanded pitch rate"),
+    Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
+    Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
+    Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
+    Q("zeta1", "rad/s", "auxiliary system of the elevator"),
+    Q("zeta2", "m/s", "auxiliary system of the thrust"),
+    Q("elevator_wanted", "rad", "elevator command before saturation"),
+    Q("thrust_wanted", "N", "thrust command before saturation"),
+)
+GRAPH = Assumption.UNDIRECTED_LEADERS_REACH_ALL
+COMMANDS = ("thrust", "elevator")
+PLANT = "longitudinal"
+FORMS = {
+    "monograph": {},
+    "flight": {
+        "kappa": 0.0,
+        "shaper": 2.0,
+        "horizon": 0.5,
+        "guard": 1.0,
+        "substeps": 2.0,
+        "k11": 3.0,
+        "k12": 3.0,
+        "k21": 2.0,
+        "k31": 6.0,
+        "k41": 20.0,
+        "k51": 3.0,
+        "k22": 2.0,
+        "k42": 12.0,
+        "k52": 6.0,
+        "e1": 0.03,
+        "e2": 0.03,
+    },
+}
+SWITCHES = {
+    "fault_tolerance": {"observers": 0.0, "auxiliary": 0.0, "guard": 0.0},
+}
+
+_LEAST_AIRSPEED = 10.0
+"""Airspeed guard in every division, m/s."""
+
+
+@compiled
+def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
+    """State at the first tick: the published zeros, or an engagement in flight in which all estimates start at 0."""
+    if gains.in_flight == 0.0:
+        z = gains.z_start
+        return State(z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, z, 0.0, 0.0)
+    z = own.z
+    return State(
+        z,
+        0.0,
+        -gains.k22 * own.gamma,
+        0.0,
+        -gains.k52 * (own.V - reference.V),
+        own.theta,
+        0.0,
+        own.q,
+        0.0,
+        0.0,
+        0.0,
+        z,
+        0.0,
+        0.0,
+    )
+
+
+@compiled
+def _disagreement(zhat, heard, gains, ahead):  # type: ignore[no-untyped-def]
+    """sum_j a_ij (zhat_i - zhat_j), sum_j a_ij and sum_j a_ij v_j, with the neighbours carried to the present."""
+    total = 0.0
+    weights = 0.0
+    rates = 0.0
+    for j in range(heard.weight.shape[0]):
+        weight = heard.weight[j]
+        if heard.valid[j] > 0.0:
+            rate = heard.values[j, 1]
+            neighbour = extrapolated(heard.values[j, 0], rate, heard.age[j] + ahead, gains.horizon)
+        elif gains.in_flight > 0.0:
+            continue
+        else:
+            rate = 0.0
+            neighbour = gains.z_start
+        total += weight * (zhat - neighbour)
+        weights += weight
+        rates += weight * rate
+    return total, weights, rates
+
+
+@compiled
+def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[no-untyped-def]
+    """One Euler step of length h, everything from the states at its beginning."""
+    V = own.V
+    divisor = max(V, _LEAST_AIRSPEED)
+    alpha = own.theta - own.gamma
+    zeta1 = gains.auxiliary * s.zeta1
+    zeta2 = gains.auxiliary * s.zeta2
+
+    # Distributed observer (5.12) and shaper.
+    total, weights, rates = _disagreement(s.zhat, heard, gains, ahead)
+    zhat_rate, slope = sliding_mode_observer(total, gains.beta1, gains.beta2, gains.phi)
+    if gains.shaper > 0.0:
+        z_ref, v_ref, a_ref = s.z_r, s.v_r, s.a_r
+        z_r_rate, v_r_rate, a_r_rate = reference_shaper(
+            s.z_r, s.v_r, s.a_r, s.zhat, zhat_rate, gains.shaper, gains.v_max, gains.a_max
+        )
+    else:
+        z_ref, v_ref, a_ref = s.zhat, zhat_rate, slope * (weights * zhat_rate - rates)
+        z_r_rate, v_r_rate, a_r_rate = 0.0, 0.0, 0.0
+
+    # Speed (5.34)-(5.39).
+    f_v, g_v = airspeed_model(V, own.gamma, alpha, model)
+    S5 = V - reference.V
+    d1_hat = gains.observers * (s.xi3 + gains.k52 * S5)
+    thrust_wanted = (-gains.k51 * S5 - f_v + reference.V_dot - d1_hat + 0.5 * gains.k51 * zeta2) / g_v
+    thrust = clip(thrust_wanted, model.thrust_min, model.thrust_max)
+
+    # Altitude (5.18).
+    S1 = own.z - z_ref
+    seen = S1
+    damped = gains.k11 * (V * math.sin(own.gamma) - v_ref)
+    integral_rate = S1
+    if gains.guard > 0.0:
+        seen = clip(S1, -gains.guard, gains.guard)
+        if seen != S1:
+            damped = 0.0
+        integral_rate = seen
+        if gains.k12 * abs(s.integral) >= gains.k11 * gains.guard and s.integral * seen > 0.0:
+            integral_rate = 0.0
+    gamma_d = (-gains.k11 * seen - gains.k12 * s.integral + v_ref) / divisor
+    V_rate = f_v + g_v * thrust + d1_hat
+    gamma_d_rate = (-damped - gains.k12 * integral_rate + a_ref) / divisor - gamma_d * V_rate / divisor
+
+    # Step 1: flight path (5.19)-(5.24).
+    f_g, g_g = flight_path_model(V, own.gamma, divisor, model)
+    S2 = own.gamma - gamma_d
+    d2_hat = gains.observers * (s.xi1 + gains.k22 * S2)
+    theta_bar = (-gains.k21 * S2 - f_g + gamma_d_rate - d2_hat) / g_g
+    theta_d_rate, p1_rate = high_gain_observer(s.theta_d, s.p1, theta_bar, gains.e1, gains.l1)
+
+    # Step 2: pitch (5.25)-(5.27).
+    S3 = own.theta - s.theta_d
+    q_bar = -gains.k31 * S3 + theta_d_rate - gains.kappa * zeta1
+    q_d_rate, p2_rate = high_gain_observer(s.q_d, s.p2, q_bar, gains.e2, gains.l2)
+
+    # Step 3: pitch rate (5.28)-(5.33).
+    f_q, g_q = pitch_rate_model(V, alpha, own.q, divisor, model)
+    S4 = own.q - s.q_d
+    lumped_hat = gains.observers * (s.xi2 + gains.k42 * S4)
+    elevator_wanted = (-gains.k41 * S4 - f_q + q_d_rate - lumped_hat + 0.5 * gains.k41 * zeta1) / g_q
+    elevator = clip(elevator_wanted, model.elevator_min, model.elevator_max)
+
+    acting_thrust, acting_elevator = thrust, elevator
+    if gains.acting > 0.0:
+        acting_thrust, acting_elevator = own.thrust, own.elevator
+    xi1_rate = disturbance_observer_rate(gains.k22, S2, s.xi1, f_g + g_g * own.theta, gamma_d_rate)
+    xi2_rate = disturbance_observer_rate(gains.k42, S4, s.xi2, f_q + g_q * acting_elevator, q_d_rate)
+    xi3_rate = disturbance_observer_rate(gains.k52, S5, s.xi3, f_v + g_v * acting_thrust, reference.V_dot)
+
+    after = State(
+        s.zhat + h * zhat_rate,
+        s.integral + h * integral_rate,
+        s.xi1 + h * xi1_rate,
+        s.xi2 + h * xi2_rate,
+        s.xi3 + h * xi3_rate,
+        s.theta_d + h * theta_d_rate,
+        s.p1 + h * p1_rate,
+        s.q_d + h * q_d_rate,
+        s.p2 + h * p2_rate,
+        s.zeta1 + h * linear_auxiliary_rate(s.zeta1, 0.5 * gains.k41, g_q, elevator, elevator_wanted),
+        s.zeta2 + h * linear_auxiliary_rate(s.zeta2, 0.5 * gains.k51, g_v, thrust, thrust_wanted),
+        s.z_r + h * z_r_rate,
+        s.v_r + h * v_r_rate,
+        s.a_r + h * a_r_rate,
+    )
+    shown = Output(
+        thrust,
+        elevator,
+        zhat_rate,
+        S1,
+        S5,
+        gamma_d,
+        d1_hat,
+        d2_hat,
+        lumped_hat,
+        elevator_wanted,
+        thrust_wanted,
+    )
+    return after, shown
+
+
+@compiled
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
+    """One tick: the state ``dt`` later, and the output of the first sub-step."""
+    h = dt / gains.substeps
+    after, output = _substep(state, own, heard, reference, model, gains, h, 0.0)
+    for n in range(1, int(gains.substeps)):
+        after, _ = _substep(after, own, heard, reference, model, gains, h, n * h)
+    return after, output
+
+
+@compiled
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+    """What the neighbours hear, for the instant of ``state``."""
+    return state.zhat, (state.v_r if gains.shaper > 0.0 else output.zhat_rate)
+
+
+@compiled
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+    """`SIGNALS` for the instant of ``state``."""
+    return (
+        state.zhat,
+        state.z_r if gains.shaper > 0.0 else state.zhat,
+        output.S1,
+        output.S5,
+        output.gamma_d,
+        state.theta_d,
+        state.q_d,
+        output.d1_hat,
+        output.d2_hat,
+        output.lumped_hat,
+        state.zeta1,
+        state.zeta2,
+        output.elevator_wanted,
+        output.thrust_wanted,
+    )
+
+
+def check(gains: Gains, flight: Flight) -> list[Problem]:
+    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    problems = []
+    positive = ("k11", "k12", "k21", "k31", "k41", "k51", "k22", "k42", "k52", "e1", "e2", "l1", "l2", "beta1", "phi")
+    for name in positive:
+        if getattr(gains, name) <= 0.0:
+            problems.append(Problem(True, f"gain {name} = {getattr(gains, name)}: must be > 0"))
+    if gains.substeps < 1.0 or gains.substeps != int(gains.substeps):
+        return [*problems, Problem(True, f"gain substeps = {gains.substeps}: must be a whole number >= 1")]
+    if gains.beta2 <= flight.leader_climb:
+        problems.append(
+            Problem(
+                True,
+                f"gain beta2 = {gains.beta2} m/s: must exceed the leaders' largest climb rate, "
+                f"{flight.leader_climb:.3f} m/s (Theorem 5.1)",
+            )
+        )
+    if flight.leader_speed_varies:
+        problems.append(Problem(True, "the leaders' speed must be constant: followers know it as a mission constant"))
+    h = flight.period / gains.substeps
+    degree = max((sum(flight.graph.weights.get((i, j), 0.0) for j in flight.graph.uavs)) for i in flight.graph.followers)
+    rates = {
+        "e1": 1.0 / max(gains.e1, 1e-9),
+        "e2": 1.0 / max(gains.e2, 1e-9),
+        "beta1, beta2 / phi": degree * (gains.beta1 + gains.beta2 / max(gains.phi, 1e-9)),
+        "k42": gains.k42,
+        "k41": gains.k41,
+    }
+    for name, rate in rates.items():
+        if rate * h >= 2.0:
+            problems.append(
+                Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {h * 1e3:g} ms")
+            )
+    return problems

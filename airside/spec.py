@@ -1,0 +1,59 @@
+"""What an autopilot process is told at its start: plain, frozen, checked before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ftcc.airside.model import Model
+from ftcc.airside.references.profiles import Profile
+from ftcc.airside.scheme import Reference
+from ftcc.link.channel import Channel
+
+__all__ = ["AutopilotSpec", "LinkEvent", "Neighbour"]
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """An in-edge of the graph: whom this UAV hears."""
+
+    uav: int
+    weight: float
+
+
+@dataclass(frozen=True)
+class LinkEvent:
+    """A change of the radio, from a simulated time on."""
+
+    at_us: int
+    sender: int | None
+    """The in-edge's sender; None: this UAV's own radio."""
+    channel: Channel
+    """The quality from then on; of the own radio only ``blocked`` counts."""
+
+
+@dataclass(frozen=True)
+class AutopilotSpec:
+    """One autopilot."""
+
+    uav: int
+    role: str
+    """"follower" or "leader"."""
+    scheme: str
+    gains: tuple[float, ...]
+    """In the order of the scheme's ``Gains``."""
+    model: Model
+    travel: tuple[float, ...]
+    """Full deflection of each actuator (rad, N), by which commands are divided on the wire."""
+    mission: Reference
+    """What a follower knows without being told: the mission's speed."""
+    neighbours: tuple[Neighbour, ...]
+    channel: Channel
+    """Quality of every in-edge at the start."""
+    link_events: tuple[LinkEvent, ...] = ()
+    """In order of time."""
+    profile: Profile | None = None
+    """A leader's."""
+    offset: float = 0.0
+    """Lateral position, m."""
+    hearers: tuple[int, ...] = field(default=())
+    """Ids of those who hear this UAV."""

@@ -1,0 +1,82 @@
+"""One tick of an autopilot: the stages between what was received and what is sent. A template, see `link.compiled`.
+
+The free name ``scheme`` is the module of the control law. `autopilots.tick_of` gives this module with a scheme filled in. The
+functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation alike.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ftcc.airside.flight_path import Own
+from ftcc.airside.model import Model
+from ftcc.airside.scheme import Heard, Reference
+from ftcc.link.compiled import compiled, fields, store
+
+__all__ = ["announce", "control"]
+
+if "scheme" not in globals():
+    raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
+
+scheme: Any = globals()["scheme"]
+
+_State = scheme.State
+_Output = scheme.Output
+_Gains = scheme.Gains
+_start = scheme.start
+_step = scheme.step
+_share = scheme.share
+_observe = scheme.observe
+_COMMANDS = len(scheme.COMMANDS)
+
+
+@compiled
+def _heard(autopilots, inbox, i):  # type: ignore[no-untyped-def]
+    n = inbox.degree[i]
+    return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
+
+
+@compiled
+def _begin(autopilots, inbox, i, own, reference, gains):  # type: ignore[no-untyped-def]
+    if autopilots.started[i] == 0:
+        model = fields(Model, autopilots.model[i])
+        store(_start(own, _heard(autopilots, inbox, i), reference, model, gains), autopilots.state[i])
+        autopilots.started[i] = 1
+
+
+@compiled
+def announce(autopilots, inbox, i):  # type: ignore[no-untyped-def]
+    """Set ``shared`` from the state at this instant, before the law's step (exchange in two phases)."""
+    own = fields(Own, autopilots.own[i])
+    reference = fields(Reference, autopilots.reference[i])
+    gains = fields(_Gains, autopilots.gains[i])
+    _begin(autopilots, inbox, i, own, reference, gains)
+    output = fields(_Output, autopilots.output[i])
+    store(_share(fields(_State, autopilots.state[i]), own, reference, output, gains), autopilots.shared[i])
+
+
+@compiled
+def control(autopilots, inbox, i, dt):  # type: ignore[no-untyped-def]
+    """Step the law of UAV ``i``: sets state, command, shared values and signals.
+
+    Shared values and signals belong to the instant of the measurement. Returns False, and leaves the command as it was,
+    if the law gives a command that is not finite.
+    """
+    own = fields(Own, autopilots.own[i])
+    reference = fields(Reference, autopilots.reference[i])
+    gains = fields(_Gains, autopilots.gains[i])
+    model = fields(Model, autopilots.model[i])
+    _begin(autopilots, inbox, i, own, reference, gains)
+    before = fields(_State, autopilots.state[i])
+    after, output = _step(before, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
+    for n in range(_COMMANDS):
+        if not math.isfinite(output[n]):
+            return False
+    store(after, autopilots.state[i])
+    store(output, autopilots.output[i])
+    store(_share(before, own, reference, output, gains), autopilots.shared[i])
+    store(_observe(before, own, reference, output, gains), autopilots.signals[i])
+    for n in range(_COMMANDS):
+        autopilots.command[i, autopilots.actuator[n]] = output[n]
+    return True

@@ -1,0 +1,188 @@
+"""A whole flight in one process, tick by tick: what the processes do, in the same order, through the same functions.
+
+A template, see `link.compiled`: the free name ``tick`` is the tick of the scheme that flies.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.autopilots import lead, set_links
+from ftcc.airside.flight_path import decode_state
+from ftcc.link.actuators import as_sent, decode_command, encode_command
+from ftcc.link.channel import admit, hear
+from ftcc.link.compiled import compiled, copy
+from ftcc.sim.plant import actuate, advance, truth
+from ftcc.sim.sensors import encode_state, measure
+
+__all__ = ["DIVERGED", "HISTORY", "Ether", "Recording", "fly"]
+
+if "tick" not in globals():
+    raise ImportError("ftcc.groundside.flight_loop is a template: use ftcc.groundside.simulate")
+
+tick: Any = globals()["tick"]
+
+_announce = tick.announce
+_control = tick.control
+
+HISTORY = 64
+"""Records kept of each sender."""
+
+DIVERGED = 5
+"""Key of ``sim.plant.LOST``: the law's command is not finite."""
+
+
+class Ether(NamedTuple):
+    """What stands in for the mesh: the last records of every UAV."""
+
+    sender: NDArray[np.int64]
+    """(k, n): index of the UAV behind each in-edge."""
+    sent: NDArray[np.int64]
+    """(k,): records sent."""
+    stamp: NDArray[np.int64]
+    """(k, HISTORY): us."""
+    radio_on: NDArray[np.int64]
+    """(k, HISTORY)."""
+    values: NDArray[np.float64]
+    """(k, HISTORY, m)."""
+
+
+class Recording(NamedTuple):
+    """Rows of the recording, time first, then UAV; nan after a UAV was lost."""
+
+    truth: NDArray[np.float64]
+    """(n, k, 13)."""
+    command: NDArray[np.float64]
+    """(n, k, 4): in force."""
+    acting: NDArray[np.float64]
+    """(n, k, 4)."""
+    signals: NDArray[np.float64]
+    """(n, k, s)."""
+    lost: NDArray[np.int64]
+    """(k,): why a UAV was lost, 0 = it was not."""
+    lost_us: NDArray[np.int64]
+    """(k,): when."""
+
+
+class Scratch(NamedTuple):
+    """Room for one tick's work."""
+
+    true: NDArray[np.float64]
+    """(k, 13)."""
+    seen: NDArray[np.float64]
+    """(13,)."""
+    message: NDArray[np.float64]
+    """(13,)."""
+    controls: NDArray[np.float64]
+    """(4,)."""
+
+
+@compiled
+def _send(ether, autopilots, events, i, now):  # type: ignore[no-untyped-def]
+    slot = ether.sent[i] % HISTORY
+    ether.stamp[i, slot] = now
+    ether.radio_on[i, slot] = events.radio_on[i]
+    copy(autopilots.shared[i], ether.values[i, slot])
+    ether.sent[i] += 1
+
+
+@compiled
+def _receive(ether, inbox, events, i, now, latency, seed):  # type: ignore[no-untyped-def]
+    for edge in range(inbox.degree[i]):
+        sender = ether.sender[i, edge]
+        while inbox.edges[i, edge, 3] < ether.sent[sender]:
+            sequence = inbox.edges[i, edge, 3]
+            slot = sequence % HISTORY
+            stamp = ether.stamp[sender, slot]
+            if stamp + latency > now:
+                break
+            radio_on = ether.radio_on[sender, slot] == 1 and events.radio_on[i] == 1
+            admit(inbox, i, edge, sequence, stamp, radio_on, ether.values[sender, slot], latency, now, seed)
+    hear(inbox, i, now)
+
+
+@compiled
+def _latch(fleet, autopilots, i, wire, buffer):  # type: ignore[no-untyped-def]
+    """Bring the last command into force."""
+    if autopilots.leader[i] == 1:
+        copy(autopilots.target[i], fleet.target[i])
+        if wire:
+            as_sent(fleet.target[i, 1:])
+    elif wire:
+        encode_command(autopilots.command[i], autopilots.travel[i], buffer)
+        decode_command(buffer, fleet.travel[i], fleet.command[i])
+    else:
+        copy(autopilots.command[i], fleet.command[i])
+
+
+@compiled
+def fly(  # type: ignore[no-untyped-def]
+    fleet, autopilots, inbox, events, ether, recording, scratch, period, exchange, latency, step, every, seed, wire, first, last
+):
+    """Fly the ticks first..last-1.
+
+    Periods are in us, ``every`` is the number of ticks between recorded rows. With ``wire``, states and commands pass
+    through the messages' float32 and a command acts one sample after its measurement, as between processes; without,
+    the exchange is ideal: all share, then all step, and the command acts at once.
+    """
+    k = fleet.state.shape[0]
+    true, seen, message, buffer = scratch.true, scratch.seen, scratch.message, scratch.controls
+    for n in range(first, last):
+        now = n * period
+        for i in range(k):
+            if recording.lost[i] > 0:
+                continue
+            if wire:
+                if n > 0:
+                    _latch(fleet, autopilots, i, wire, buffer)
+                actuate(fleet, i, now / 1e6)
+            truth(fleet, i, now / 1e6, true[i])
+            measure(fleet, i, n, seed, true[i], seen)
+            if wire:
+                encode_state(seen, message)
+                # The vehicle reports the command in force as it received it.
+                encode_command(fleet.command[i], fleet.travel[i], buffer)
+                decode_command(buffer, autopilots.travel[i], buffer)
+                decode_state(message, now / 1e6, buffer, autopilots.own[i])
+            else:
+                autopilots.own[i, 0] = now / 1e6
+                copy(seen, autopilots.own[i, 1:])
+                copy(fleet.command[i], autopilots.own[i, 14:])
+            if autopilots.leader[i] == 1:
+                lead(autopilots, i, now, period)
+        set_links(events, inbox, now)
+        if not wire:
+            for i in range(k):
+                if recording.lost[i] == 0:
+                    if autopilots.leader[i] == 0:
+                        _announce(autopilots, inbox, i)
+                    _send(ether, autopilots, events, i, now)
+        for i in range(k):
+            if recording.lost[i] == 0 and autopilots.leader[i] == 0:
+                _receive(ether, inbox, events, i, now, latency, seed)
+                if not _control(autopilots, inbox, i, period / 1e6):
+                    recording.lost[i] = DIVERGED
+                    recording.lost_us[i] = now
+        if wire and now % exchange == 0:
+            for i in range(k):
+                if recording.lost[i] == 0:
+                    _send(ether, autopilots, events, i, now)
+        for i in range(k):
+            if recording.lost[i] > 0:
+                continue
+            if not wire:
+                _latch(fleet, autopilots, i, wire, buffer)
+                actuate(fleet, i, now / 1e6)
+            if n % every == 0:
+                row = n // every
+                copy(true[i], recording.truth[row, i])
+                copy(fleet.command[i], recording.command[row, i])
+                copy(fleet.acting[i], recording.acting[row, i])
+                copy(autopilots.signals[i], recording.signals[row, i])
+            why = advance(fleet, i, now, period, step)
+            if why > 0:
+                recording.lost[i] = why
+                recording.lost_us[i] = now + period

@@ -1,0 +1,41 @@
+"""The time grid that all processes of a run share. Simulated times are whole microseconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Timing"]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Periods of a run; tick k is at time k * period."""
+
+    period_us: int
+    """Control period."""
+    exchange_us: int
+    """Period of the neighbours' records, a multiple of the control period."""
+    latency_us: int
+    """Link latency: a record stamped t is usable from t + latency on."""
+    step_us: int
+    """Integration step of the plant."""
+    ticks: int
+    """The last tick."""
+    record_every: int
+    """Ticks between recorded rows."""
+    seed: int
+
+    @property
+    def period(self) -> float:
+        """Control period, s."""
+        return self.period_us / 1e6
+
+    @property
+    def exchange_every(self) -> int:
+        """Ticks between records to the neighbours."""
+        return self.exchange_us // self.period_us
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return self.ticks * self.period_us / 1e6

@@ -1,0 +1,84 @@
+"""What a vehicle reports: measurement noise and the state as MAVLink carries it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ftcc.link.compiled import compiled, copy
+from ftcc.link.philox import NOISE, gaussian_pair, philox
+from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, P, Q, R, THETA, TRUTH, V, X, Y, Z
+
+__all__ = ["STATE_MESSAGE", "encode_state", "measure"]
+
+STATE_MESSAGE = ("q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed", "x", "y", "z", "vx", "vy", "vz")
+"""The float32 fields of ATTITUDE_QUATERNION and LOCAL_POSITION_NED, in this order."""
+
+_CHANNELS = len(TRUTH)
+
+
+@compiled
+def _add_noise(measured, deviation, seed, uav, tick):  # type: ignore[no-untyped-def]
+    """Add white noise to ``measured`` (order of `TRUTH`) with the given standard deviations, drawn for this tick.
+
+    The angle of attack stays the difference of pitch and flight-path angle, as measured.
+    """
+    noisy = False
+    for i in range(_CHANNELS):
+        noisy = noisy or deviation[i] > 0.0
+    if not noisy:
+        return
+    for pair in range((_CHANNELS + 1) // 2):
+        u, v, _, _ = philox(seed, tick & 0xFFFFFFFF, uav, NOISE, pair)
+        first, second = gaussian_pair(u, v)
+        measured[2 * pair] += deviation[2 * pair] * first
+        if 2 * pair + 1 < _CHANNELS:
+            measured[2 * pair + 1] += deviation[2 * pair + 1] * second
+    measured[ALPHA] += measured[THETA] - measured[GAMMA] - measured[ALPHA]
+
+
+@compiled
+def _times(a0, a1, a2, a3, b0, b1, b2, b3):  # type: ignore[no-untyped-def]
+    """Product of two quaternions."""
+    return (
+        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+        a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
+        a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+    )
+
+
+@compiled
+def encode_state(measured, out):  # type: ignore[no-untyped-def]
+    """Turn ``measured`` (order of `TRUTH`) into the fields of `STATE_MESSAGE`, rounded to float32 as on the wire.
+
+    The attitude is the path frame (chi, gamma, mu) turned by sideslip and angle of attack; north-east-down.
+    """
+    cos_gamma = math.cos(measured[GAMMA])
+    q0, q1, q2, q3 = math.cos(0.5 * measured[CHI]), 0.0, 0.0, math.sin(0.5 * measured[CHI])
+    q0, q1, q2, q3 = _times(
+        q0, q1, q2, q3, math.cos(0.5 * measured[GAMMA]), 0.0, math.sin(0.5 * measured[GAMMA]), 0.0
+    )
+    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[MU]), math.sin(0.5 * measured[MU]), 0.0, 0.0)
+    q0, q1, q2, q3 = _times(
+        q0, q1, q2, q3, math.cos(0.5 * measured[BETA]), 0.0, 0.0, -math.sin(0.5 * measured[BETA])
+    )
+    q0, q1, q2, q3 = _times(
+        q0, q1, q2, q3, math.cos(0.5 * measured[ALPHA]), 0.0, math.sin(0.5 * measured[ALPHA]), 0.0
+    )
+    out[0], out[1], out[2], out[3] = q0, q1, q2, q3
+    out[4], out[5], out[6] = measured[P], measured[Q], measured[R]
+    out[7], out[8], out[9] = measured[X], measured[Y], -measured[Z]
+    out[10] = measured[V] * cos_gamma * math.cos(measured[CHI])
+    out[11] = measured[V] * cos_gamma * math.sin(measured[CHI])
+    out[12] = -measured[V] * math.sin(measured[GAMMA])
+    for i in range(13):
+        out[i] = float(np.float32(out[i]))
+
+
+@compiled
+def measure(fleet, i, tick, seed, true, out):  # type: ignore[no-untyped-def]
+    """``true`` with the noise of vehicle ``i`` at this tick."""
+    copy(true, out)
+    _add_noise(out, fleet.noise[i], seed, fleet.uav[i], tick)

@@ -1,0 +1,84 @@
+"""What a vehicle process is told at its start: plain, frozen, checked before."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ftcc.link.actuators import ACTUATORS
+from ftcc.sim.airframe import Airframe
+from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet
+
+__all__ = ["VehicleSpec", "build"]
+
+
+@dataclass(frozen=True)
+class VehicleSpec:
+    """One vehicle."""
+
+    uav: int
+    kind: str
+    """"longitudinal", or "reference_point": the kinematic stand-in for a leader's aircraft."""
+    airframe: Airframe
+    initial: tuple[float, ...]
+    """V, x, z, gamma, theta, q."""
+    command: tuple[float, ...]
+    """Command in force, and position of the actuators, before the first one arrives; order of ``ACTUATORS``."""
+    limits: tuple[tuple[float, float], ...]
+    lag: tuple[float, ...]
+    """rad/s, 0 = none."""
+    fault_before_lag: bool
+    faults: tuple[Fault, ...]
+    disturbances: tuple[Disturbance, ...]
+    noise: tuple[float, ...]
+    """Standard deviation of each channel of ``TRUTH`` as measured."""
+    guards: tuple[float, float, float]
+    """Least airspeed m/s, largest abs(gamma), largest abs(alpha) rad."""
+    offset: float
+    """Lateral position, m."""
+
+    @property
+    def travel(self) -> tuple[float, ...]:
+        """Full deflection of each actuator, by which commands are divided on the wire."""
+        return tuple(max(abs(low), abs(high)) for low, high in self.limits)
+
+
+def _padded(rows: Sequence[Sequence[tuple[float, ...]]], width: int) -> np.ndarray:
+    table = np.zeros((len(rows), max([1] + [len(row) for row in rows]), width))
+    table[:, :, 0] = math.inf
+    for i, row in enumerate(rows):
+        if row:
+            table[i, : len(row)] = sorted(row)
+    return table
+
+
+def build(specs: Sequence[VehicleSpec]) -> Fleet:
+    """Arrays for ``specs`` before the first tick."""
+    k = len(specs)
+    target = np.zeros((k, 7))
+    for i, spec in enumerate(specs):
+        V, x, z, gamma = spec.initial[:4]
+        target[i] = (0.0, x, spec.offset, z, V * math.cos(gamma), 0.0, V * math.sin(gamma))
+    command = np.array([spec.command for spec in specs], np.float64)
+    return Fleet(
+        state=np.array([spec.initial for spec in specs], np.float64),
+        position=np.array([np.clip(s.command, *zip(*s.limits, strict=True)) for s in specs], np.float64),
+        command=command,
+        acting=np.zeros((k, len(ACTUATORS))),
+        limits=np.array([spec.limits for spec in specs], np.float64),
+        lag=np.array([spec.lag for spec in specs], np.float64),
+        fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
+        faults=_padded([spec.faults for spec in specs], len(Fault._fields)),
+        disturbances=_padded([spec.disturbances for spec in specs], len(Disturbance._fields)),
+        guards=np.array([spec.guards for spec in specs], np.float64),
+        airframe=np.array([spec.airframe for spec in specs], np.float64),
+        offset=np.array([spec.offset for spec in specs], np.float64),
+        target=target,
+        point=np.array([spec.kind == "reference_point" for spec in specs], np.int64),
+        noise=np.array([spec.noise for spec in specs], np.float64).reshape(k, len(TRUTH)),
+        uav=np.array([spec.uav for spec in specs], np.int64),
+        travel=np.array([spec.travel for spec in specs], np.float64),
+    )
