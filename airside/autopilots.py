@@ -15,17 +15,30 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.flight_path import Own
-from ftcc.airside.references.profiles import new_profile_state, profile_arrays, refer
+from ftcc.airside.flight_path import Own, decode_state
+from ftcc.airside.references.profiles import (
+    PROFILE_PARAMETERS,
+    PROFILE_STATES,
+    TRIGGER_COLUMNS,
+    armed,
+    new_profile_state,
+    profile_arrays,
+    refer,
+    trigger_rows,
+)
 from ftcc.airside.scheme import Reference, Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import ACTUATORS, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, copy, instantiate
 from ftcc.link.timing import Timing
 
-__all__ = ["Autopilots", "LinkEvents", "build", "lead", "link_events", "set_links", "tick_of"]
+__all__ = ["Autopilots", "LinkEvents", "build", "lead", "link_events", "sense", "sense_and_refer", "set_links", "tick_of"]
+
+
+X = Reference._fields.index("x")
+X_DOT = Reference._fields.index("x_dot")
 
 
 class Autopilots(NamedTuple):
@@ -34,7 +47,7 @@ class Autopilots(NamedTuple):
     own: NDArray[np.float64]
     """(k, 18): see `Own`."""
     reference: NDArray[np.float64]
-    """(k, 6): see `Reference`."""
+    """(k, 7): see `Reference`."""
     state: NDArray[np.float64]
     """(k, n): the scheme's ``State``."""
     output: NDArray[np.float64]
@@ -62,11 +75,13 @@ class Autopilots(NamedTuple):
     offset: NDArray[np.float64]
     """(k,): lateral position, m."""
     profile: NDArray[np.float64]
-    """(k, 15): parameters of the leaders' profiles."""
+    """(k, 19): parameters of the leaders' profiles."""
     profile_commands: NDArray[np.float64]
-    """(k, n, 3): their commands; unused rows have time inf."""
+    """(k, n, 3): their commands by time; unused rows have time inf."""
+    profile_triggers: NDArray[np.float64]
+    """(k, n, 4): their commands by position, see `trigger_rows`; unused rows have position inf."""
     profile_state: NDArray[np.float64]
-    """(k, 5)."""
+    """(k, 7): see `new_profile_state`."""
     leader_shares: NDArray[np.int64]
     """(m,): which entries of `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
@@ -104,11 +119,15 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     profiles = [profile_arrays(spec.profile, timing.period) if spec.profile else None for spec in specs]
     rows = max([1] + [len(pair[1]) for pair in profiles if pair])
     commands = np.full((k, rows, 3), math.inf)
-    parameters = np.zeros((k, 15))
-    states = np.zeros((k, 5))
+    triggers = np.full((k, max(1, *(len(s.profile.triggers) if s.profile else 0 for s in specs)), TRIGGER_COLUMNS), math.inf)
+    parameters = np.zeros((k, PROFILE_PARAMETERS))
+    states = np.zeros((k, PROFILE_STATES))
     for i, (spec, pair) in enumerate(zip(specs, profiles, strict=True)):
         if pair and spec.profile:
             parameters[i], commands[i, : len(pair[1])] = pair
+            triggers[i, : len(spec.profile.triggers)] = trigger_rows(
+                spec.profile, spec.uav, [n.uav for n in spec.neighbours]
+            )
             states[i] = new_profile_state(spec.profile)
     inbox = new_inbox([[n.uav for n in spec.neighbours] for spec in specs], [s.uav for s in specs], width, Channel())
     weight = np.zeros(inbox.valid.shape)
@@ -138,6 +157,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             offset=np.array([spec.offset for spec in specs], np.float64),
             profile=parameters,
             profile_commands=commands,
+            profile_triggers=triggers,
             profile_state=states,
             leader_shares=np.array(shares + [-1] * (width - len(shares)), np.int64),
             actuator=np.array([ACTUATORS.index(name) for name in scheme.commands], np.int64),
@@ -177,17 +197,53 @@ def set_links(events, inbox, now_us):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lead(autopilots, i, now_us, period_us):  # type: ignore[no-untyped-def]
-    """A leader's tick: advance the profile of UAV ``i``, set its target and what it shares."""
+def sense(autopilots, i, message, reported, now_us):  # type: ignore[no-untyped-def]
+    """Own state of UAV ``i`` from its vehicle's message (13,) and the command that it reports in force, as fractions (4,).
+
+    ``reported`` is overwritten with the command in rad and N.
+    """
+    decode_command(reported, autopilots.travel[i], reported)
+    decode_state(message, now_us / 1e6, reported, autopilots.own[i])
+
+
+@compiled
+def sense_and_refer(autopilots, active, messages, reported, now_us, period_us):  # type: ignore[no-untyped-def]
+    """The first stage of a tick of all ``active``; leaders refer after `hear`, see ``tick.hear_and_control``."""
+    for i in range(active.shape[0]):
+        if active[i] == 1:
+            sense(autopilots, i, messages[i], reported[i], now_us)
+
+
+@compiled
+def _position_of(autopilots, inbox, i, edge):  # type: ignore[no-untyped-def]
+    """Present forward position of the leader behind in-edge ``edge``, carried on by its speed; nan before its first record."""
+    if edge < 0 or inbox.valid[i, edge] == 0.0:
+        return math.nan
+    position = math.nan
+    speed = 0.0
+    for m in range(autopilots.shared.shape[1]):
+        if autopilots.leader_shares[m] == X:
+            position = inbox.values[i, edge, m]
+        elif autopilots.leader_shares[m] == X_DOT:
+            speed = inbox.values[i, edge, m]
+    return position + speed * inbox.age[i, edge]
+
+
+@compiled
+def lead(autopilots, inbox, i, now_us, period_us):  # type: ignore[no-untyped-def]
+    """A leader's tick: advance the profile of UAV ``i``, set its target and what it shares.
+
+    To be called after `hear`: a profile may wait for the position of another leader.
+    """
     reference = autopilots.reference[i]
-    refer(
-        autopilots.profile[i], autopilots.profile_commands[i], autopilots.profile_state[i], reference, now_us, period_us
-    )
-    V, z_dot = reference[1], reference[4]
+    triggers = autopilots.profile_triggers[i]
+    state = autopilots.profile_state[i]
+    seen = _position_of(autopilots, inbox, i, armed(triggers, state))
+    refer(autopilots.profile[i], autopilots.profile_commands[i], triggers, state, reference, seen, now_us, period_us)
     target = autopilots.target[i]
     target[0] = now_us / 1e6
     target[1], target[2], target[3] = reference[0], autopilots.offset[i], reference[3]
-    target[4], target[5], target[6] = math.sqrt(max(V * V - z_dot * z_dot, 0.0)), 0.0, z_dot
+    target[4], target[5], target[6] = reference[X_DOT], 0.0, reference[4]
     for m in range(autopilots.shared.shape[1]):
         source = autopilots.leader_shares[m]
         autopilots.shared[i, m] = reference[source] if source >= 0 else 0.0

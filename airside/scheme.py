@@ -68,6 +68,8 @@ class Reference(NamedTuple):
     """m/s."""
     z_ddot: float
     """m/s^2."""
+    x_dot: float = 0.0
+    """Forward speed, m/s."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ class Flight:
     leader_climb: float
     """Largest abs(climb rate) of the leaders' profiles, m/s."""
     leader_speed_varies: bool
+    leader_acceleration: float = 0.0
+    """Largest acceleration of the leaders' profiles along either axis, m/s^2."""
     initial: Mapping[int, Reference] = field(default_factory=dict)
     """Initial speed and altitude of each follower, by id."""
 

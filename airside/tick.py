@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard, Reference
+from ftcc.link.actuators import encode_command
+from ftcc.link.channel import hear
 from ftcc.link.compiled import compiled, fields, store
 
-__all__ = ["announce", "control"]
+__all__ = ["announce", "control", "hear_and_control"]
 
 if "scheme" not in globals():
     raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
@@ -80,3 +83,21 @@ def control(autopilots, inbox, i, dt):  # type: ignore[no-untyped-def]
     for n in range(_COMMANDS):
         autopilots.command[i, autopilots.actuator[n]] = output[n]
     return True
+
+
+@compiled
+def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):  # type: ignore[no-untyped-def]
+    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles or the followers' law.
+
+    Followers' commands are written to ``controls`` as fractions of travel (k, 4). ``ok`` (k,) tells whose command is
+    finite.
+    """
+    for i in range(active.shape[0]):
+        if active[i] == 1:
+            ok[i] = 1
+            hear(inbox, i, now_us)
+            if autopilots.leader[i] == 1:
+                lead(autopilots, inbox, i, now_us, period_us)
+            else:
+                ok[i] = 1 if control(autopilots, inbox, i, period_us / 1e6) else 0
+                encode_command(autopilots.command[i], autopilots.travel[i], controls[i])

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import lead, set_links
-from ftcc.airside.flight_path import decode_state
+from ftcc.airside.autopilots import lead, sense, set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
-from ftcc.link.compiled import compiled, copy
+from ftcc.link.compiled import compiled, copy, fill
 from ftcc.sim.plant import actuate, advance, truth
 from ftcc.sim.sensors import encode_state, measure
 
@@ -132,6 +131,7 @@ def fly(  # type: ignore[no-untyped-def]
     true, seen, message, buffer = scratch.true, scratch.seen, scratch.message, scratch.controls
     for n in range(first, last):
         now = n * period
+        set_links(events, inbox, now)
         for i in range(k):
             if recording.lost[i] > 0:
                 continue
@@ -145,15 +145,15 @@ def fly(  # type: ignore[no-untyped-def]
                 encode_state(seen, message)
                 # The vehicle reports the command in force as it received it.
                 encode_command(fleet.command[i], fleet.travel[i], buffer)
-                decode_command(buffer, autopilots.travel[i], buffer)
-                decode_state(message, now / 1e6, buffer, autopilots.own[i])
+                sense(autopilots, i, message, buffer, now)
             else:
                 autopilots.own[i, 0] = now / 1e6
                 copy(seen, autopilots.own[i, 1:])
                 copy(fleet.command[i], autopilots.own[i, 14:])
             if autopilots.leader[i] == 1:
-                lead(autopilots, i, now, period)
-        set_links(events, inbox, now)
+                # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
+                _receive(ether, inbox, events, i, now, latency, seed)
+                lead(autopilots, inbox, i, now, period)
         if not wire:
             for i in range(k):
                 if recording.lost[i] == 0:
@@ -166,12 +166,14 @@ def fly(  # type: ignore[no-untyped-def]
                 if not _control(autopilots, inbox, i, period / 1e6):
                     recording.lost[i] = DIVERGED
                     recording.lost_us[i] = now
+                    fill(autopilots.signals[i], np.nan)
         if wire and now % exchange == 0:
             for i in range(k):
                 if recording.lost[i] == 0:
                     _send(ether, autopilots, events, i, now)
         for i in range(k):
-            if recording.lost[i] > 0:
+            diverged_now = recording.lost[i] == DIVERGED and recording.lost_us[i] == now
+            if recording.lost[i] > 0 and not diverged_now:
                 continue
             if not wire:
                 _latch(fleet, autopilots, i, wire, buffer)
@@ -183,6 +185,6 @@ def fly(  # type: ignore[no-untyped-def]
                 copy(fleet.acting[i], recording.acting[row, i])
                 copy(autopilots.signals[i], recording.signals[row, i])
             why = advance(fleet, i, now, period, step)
-            if why > 0:
+            if why > 0 and recording.lost[i] == 0:
                 recording.lost[i] = why
                 recording.lost_us[i] = now + period

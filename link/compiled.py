@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
-__all__ = ["SCHEME_ENTRY_POINTS", "cache_folder", "compiled", "copy", "fields", "instantiate", "store"]
+__all__ = ["SCHEME_ENTRY_POINTS", "cache_folder", "compiled", "copy", "fields", "fill", "instantiate", "store"]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -103,6 +103,13 @@ def copy(source, target):  # type: ignore[no-untyped-def]
     """Copy the vector ``source`` into the beginning of ``target``; faster when compiled than an assignment of slices."""
     for i in range(source.shape[0]):
         target[i] = source[i]
+
+
+@compiled
+def fill(target, value):  # type: ignore[no-untyped-def]
+    """Set every entry of the vector ``target`` to ``value``."""
+    for i in range(target.shape[0]):
+        target[i] = value
 
 
 def instantiate(template: str, name: str, **names: Any) -> ModuleType:

@@ -25,6 +25,7 @@ __all__ = [
     "Fleet",
     "actuate",
     "advance",
+    "effects",
     "truth",
 ]
 
@@ -261,3 +262,9 @@ def truth(fleet, i, time, out):  # type: ignore[no-untyped-def]
         _point_truth(fleet, i, time, out)
     else:
         _aircraft_truth(fleet, i, out)
+
+
+def effects(fleet: Fleet, i: int, time: float) -> list[float]:
+    """Effectiveness (4) and bias (4) of the actuators of vehicle ``i`` at ``time`` (s)."""
+    pairs = [_fault(fleet, i, actuator, time) for actuator in range(4)]
+    return [pair[0] for pair in pairs] + [pair[1] for pair in pairs]

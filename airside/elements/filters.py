@@ -1,11 +1,43 @@
-"""Filters and shapers: states in, rates out."""
+"""Filters, differentiators and shapers: states in, rates out."""
 
 from __future__ import annotations
 
+import math
+
+from ftcc.airside.elements.nonlinear import sign
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
 
-__all__ = ["high_gain_observer", "reference_shaper"]
+__all__ = [
+    "butterworth",
+    "complementary_rate",
+    "first_order_rate",
+    "high_gain_observer",
+    "limited_tracker",
+    "reference_shaper",
+    "second_order_reference_step",
+    "sliding_mode_differentiator",
+]
+
+
+@compiled
+def first_order_rate(value, target, time_constant):  # type: ignore[no-untyped-def]
+    """Rate of a first-order filter, eqs. (3.31), (4.24): time_constant value' + value = target.
+
+    Dynamic surface control takes this rate as the derivative of the virtual control ``target``.
+    """
+    return (target - value) / time_constant
+
+
+@compiled
+def butterworth(value, rate, target, w):  # type: ignore[no-untyped-def]
+    """Second-order Butterworth low-pass of bandwidth ``w`` (rad/s), eq. (6.14): y'' = w^2 (x - y) - sqrt(2) w y'.
+
+    Returns
+    -------
+    (value', rate')
+    """
+    return rate, w * w * (target - value) - math.sqrt(2.0) * w * rate
 
 
 @compiled
@@ -19,6 +51,55 @@ def high_gain_observer(value, rate, target, epsilon, damping):  # type: ignore[n
     (value', rate')
     """
     return rate / epsilon, (-damping * rate - value + target) / epsilon
+
+
+@compiled
+def sliding_mode_differentiator(value, derivative, target, mu1, mu2):  # type: ignore[no-untyped-def]
+    """First-order sliding-mode differentiator of ``target`` (Levant), eq. (6.42), the lost dot of its second line restored.
+
+    value' = -mu1 |value - target|^0.5 sign(value - target) + derivative; derivative' = -mu2 sign(value - target). It
+    follows exactly, after a finite time, where abs(target'') < mu2.
+
+    Returns
+    -------
+    (value', derivative')
+    """
+    error = value - target
+    return -mu1 * math.sqrt(abs(error)) * sign(error) + derivative, -mu2 * sign(error)
+
+
+@compiled
+def complementary_rate(estimate, rate, measured, gain):  # type: ignore[no-untyped-def]
+    """Rate of a complementary filter: follows ``rate`` at once and ``measured`` with the bandwidth ``gain`` (1/s)."""
+    return rate + gain * (measured - estimate)
+
+
+@compiled
+def limited_tracker(value, rate, target, target_rate, w, limit):  # type: ignore[no-untyped-def]
+    """Critically damped second-order tracker of a reference with limited acceleration (not in the monograph).
+
+    No lag on a ramp.
+
+    Returns
+    -------
+    (value', rate') with abs(rate') <= ``limit``
+    """
+    return rate, clip(w * w * (target - value) + 2.0 * w * (target_rate - rate), -limit, limit)
+
+
+@compiled
+def second_order_reference_step(value, rate, target, target_rate, w, damping, h):  # type: ignore[no-untyped-def]
+    """One step of length ``h`` of r'' = w^2 (x - r) + 2 damping w (x' - r') (not in the monograph); no lag on a ramp.
+
+    Steps itself, semi-implicitly: stable for every h.
+
+    Returns
+    -------
+    value, rate after the step
+    """
+    pull = w * w * (target - value) + 2.0 * damping * w * target_rate
+    rate = (rate + h * pull) / (1.0 + 2.0 * damping * w * h + w * w * h * h)
+    return value + h * rate, rate
 
 
 @compiled

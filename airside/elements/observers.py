@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 
+from ftcc.airside.elements.nonlinear import signed_power
 from ftcc.link.compiled import compiled
 
-__all__ = ["disturbance_observer_rate", "extrapolated", "sliding_mode_observer"]
+__all__ = [
+    "disturbance_observer_rate",
+    "finite_time_observer",
+    "sliding_mode_observer",
+    "unexplained_acceleration",
+]
 
 
 @compiled
@@ -17,6 +23,20 @@ def disturbance_observer_rate(gain, error, state, known, reference_rate):  # typ
     d_hat = xi + gain error obeys d_hat' = gain (d - d_hat).
     """
     return -gain * (known + state + gain * error - reference_rate)
+
+
+@compiled
+def unexplained_acceleration(gain, rate, state, explained):  # type: ignore[no-untyped-def]
+    """Estimate of the part of an acceleration that ``explained`` does not account for (not in the monograph).
+
+    For rate' = explained + d, the estimate d_hat = gain (rate - state) obeys d_hat' = gain (d - d_hat).
+
+    Returns
+    -------
+    d_hat, state' : float
+    """
+    estimate = gain * (rate - state)
+    return estimate, explained + estimate
 
 
 @compiled
@@ -35,6 +55,17 @@ def sliding_mode_observer(disagreement, beta1, beta2, phi):  # type: ignore[no-u
 
 
 @compiled
-def extrapolated(value, rate, age, horizon):  # type: ignore[no-untyped-def]
-    """A neighbour's value carried to the present by the rate it sent, for at most ``horizon`` seconds."""
-    return value + rate * min(age, horizon)
+def finite_time_observer(rate, disagreement, rate_disagreement, beta1, beta2, beta3, beta4, exponent, kappa):  # type: ignore[no-untyped-def]
+    """Rates of a distributed finite-time estimate of position and velocity, eqs. (6.22)-(6.23).
+
+    ``rate`` is the velocity estimate, the disagreements are sum_j a_ij (own - neighbour's) of position and velocity;
+    sign is smoothed to tanh(./kappa). ``beta4`` must exceed the leaders' acceleration (Lemma 6.6).
+
+    Returns
+    -------
+    position', velocity' : float
+    """
+    return (
+        rate - beta1 * signed_power(disagreement, exponent) - beta2 * math.tanh(disagreement / kappa),
+        -beta3 * signed_power(rate_disagreement, exponent) - beta4 * math.tanh(rate_disagreement / kappa),
+    )

@@ -1,11 +1,14 @@
-"""A leader's profile: altitude and speed commands through a second-order filter, plus a cosine in altitude.
+"""A leader's profile: altitude and speed commands through second-order filters, by time or by position.
 
-Eqs. (5.54)-(5.55); the filter is propagated exactly from tick to tick for the command in force.
+Eqs. (5.54)-(5.55), the climbs over obstacles of chapter 6 and the like. The filters are propagated exactly from tick to
+tick for the command in force. Commands by position wait for a leader (this one, or one that this one hears) to
+pass a forward position; they come in a fixed order, and a fired one supersedes every command by time.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,14 +19,42 @@ from scipy.linalg import expm
 from ftcc.airside.scheme import Reference
 from ftcc.link.compiled import compiled
 
-__all__ = ["Command", "Cosine", "Profile", "largest_climb", "new_profile_state", "profile_arrays", "refer"]
+__all__ = [
+    "CLAMPED",
+    "PROFILE_PARAMETERS",
+    "PROFILE_STATES",
+    "TRIGGER_COLUMNS",
+    "Command",
+    "Cosine",
+    "Profile",
+    "SpeedWave",
+    "Trigger",
+    "armed",
+    "largest_acceleration",
+    "largest_climb",
+    "new_profile_state",
+    "profile_arrays",
+    "refer",
+    "sampled",
+    "trigger_rows",
+]
 
 
 @dataclass(frozen=True)
 class Command:
-    """From ``at`` on (s), go to this altitude (m) and airspeed (m/s)."""
+    """From ``at`` on (s), go to this altitude (m) and speed (m/s)."""
 
     at: float
+    altitude: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """Once leader ``uav`` has passed the forward position ``x`` (m), go to this altitude (m) and speed (m/s)."""
+
+    uav: int
+    x: float
     altitude: float
     speed: float
 
@@ -38,6 +69,14 @@ class Cosine:
 
 
 @dataclass(frozen=True)
+class SpeedWave:
+    """amplitude sin(frequency t), m/s, added to the speed from t = 0 on."""
+
+    amplitude: float
+    frequency: float
+
+
+@dataclass(frozen=True)
 class Profile:
     """A leader's commanded motion."""
 
@@ -46,25 +85,45 @@ class Profile:
     z: float
     """Altitude at the start, m."""
     V: float
-    """Airspeed at the start, m/s."""
+    """Speed at the start, m/s."""
     commands: tuple[Command, ...] = ()
     """In order of time."""
     altitude_filter: tuple[float, float] = (0.05, 0.9)
     """Natural frequency (rad/s) and damping of the altitude filter."""
     speed_filter: tuple[float, float] = (0.05, 0.95)
     cosine: Cosine | None = None
+    triggers: tuple[Trigger, ...] = ()
+    """In the order in which they fire: each is armed by the one before it."""
+    forward: bool = False
+    """Speeds are forward speeds x' instead of airspeeds."""
+    speed_wave: SpeedWave | None = None
+    climb_limit: float = math.inf
+    """Largest abs(climb rate), m/s: what the followers can fly and estimate; the filter waits at it."""
 
 
 # Columns of the parameter vector of a profile.
 _Z_PHI, _V_PHI = 0, 4
 _Z_FREQUENCY, _Z_DAMPING, _V_FREQUENCY, _V_DAMPING = 8, 9, 10, 11
 _COSINE_AT, _COSINE_AMPLITUDE, _COSINE_FREQUENCY = 12, 13, 14
-_PARAMETERS = 15
+_FORWARD, _WAVE_AMPLITUDE, _WAVE_FREQUENCY, _CLIMB_LIMIT = 15, 16, 17, 18
+PROFILE_PARAMETERS = 19
+
+# Columns of the state of a profile.
+_X, _Z, _Z_RATE, _V, _V_RATE, _FIRED = range(6)
+CLAMPED = 6
+"""Column of the state: 1 while the climb rate is held at the profile's limit."""
+PROFILE_STATES = 7
+
+TRIGGER_COLUMNS = 4
+"""In-edge of the watched leader (-1: this one itself), forward position, altitude, speed."""
+
+_ROUNDING = 1e-6
+"""A position counts as passed from this far before it, m: rounding must not decide which leader fires a tick later."""
 
 
 def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The profile as the compiled functions want it: parameters (15,) and commands (n, 3) with rows (at, z, V)."""
-    parameters = np.zeros(_PARAMETERS)
+    """The profile as the compiled functions want it: parameters (19,) and commands (n, 3) with rows (at, z, V)."""
+    parameters = np.zeros(PROFILE_PARAMETERS)
     for start, (frequency, damping) in (
         (_Z_PHI, profile.altitude_filter),
         (_V_PHI, profile.speed_filter),
@@ -78,17 +137,51 @@ def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64]
         parameters[_COSINE_AT] = profile.cosine.at
         parameters[_COSINE_AMPLITUDE] = profile.cosine.amplitude
         parameters[_COSINE_FREQUENCY] = profile.cosine.frequency
+    parameters[_FORWARD] = float(profile.forward)
+    if profile.speed_wave is not None:
+        parameters[_WAVE_AMPLITUDE] = profile.speed_wave.amplitude
+        parameters[_WAVE_FREQUENCY] = profile.speed_wave.frequency
+    parameters[_CLIMB_LIMIT] = profile.climb_limit
     rows = [(-math.inf, profile.z, profile.V)] + [(c.at, c.altitude, c.speed) for c in profile.commands]
     return parameters, np.array(rows)
 
 
+def trigger_rows(profile: Profile, uav: int, senders: Sequence[int]) -> NDArray[np.float64]:
+    """The commands by position of leader ``uav``, shape (n, 4), see `TRIGGER_COLUMNS`; ``senders``: whom it hears.
+
+    Raises
+    ------
+    ValueError
+        If a trigger watches a UAV that this leader does not hear.
+    """
+    rows = np.zeros((len(profile.triggers), TRIGGER_COLUMNS))
+    for row, trigger in zip(rows, profile.triggers, strict=True):
+        if trigger.uav != uav and trigger.uav not in senders:
+            raise ValueError(
+                f"the profile of leader {uav} waits for UAV {trigger.uav} to pass x = {trigger.x:g} m, "
+                f"but there is no edge {trigger.uav} -> {uav} over which it would hear that"
+            )
+        row[:] = (-1 if trigger.uav == uav else senders.index(trigger.uav), trigger.x, trigger.altitude, trigger.speed)
+    return rows
+
+
 def new_profile_state(profile: Profile) -> NDArray[np.float64]:
-    """Filter state before the first tick: x, z, z_dot, V, V_dot."""
-    return np.array([profile.x, profile.z, 0.0, profile.V, 0.0])
+    """State before the first tick: x, z, z_dot, V, V_dot, number of triggers fired, climb rate clamped."""
+    return np.array([profile.x, profile.z, 0.0, profile.V, 0.0, 0.0, 0.0])
 
 
 @compiled
-def _command(commands, time):  # type: ignore[no-untyped-def]
+def armed(triggers, state):  # type: ignore[no-untyped-def]
+    """In-edge of the leader whose position the next trigger waits for; -1: the own position, -2: none is left."""
+    n = int(state[_FIRED])
+    return int(triggers[n, 0]) if n < triggers.shape[0] and triggers[n, 1] < math.inf else -2
+
+
+@compiled
+def _command(commands, triggers, state, time):  # type: ignore[no-untyped-def]
+    fired = int(state[_FIRED])
+    if fired > 0:
+        return triggers[fired - 1, 2], triggers[fired - 1, 3]
     latest = 0
     for n in range(commands.shape[0]):
         if commands[n, 0] <= time:
@@ -106,50 +199,107 @@ def _filtered(phi, start, value, rate, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _cosine(parameters, time):  # type: ignore[no-untyped-def]
+    since = time - parameters[_COSINE_AT]
+    if not since >= 0.0:
+        return 0.0, 0.0, 0.0
+    amplitude, frequency = parameters[_COSINE_AMPLITUDE], parameters[_COSINE_FREQUENCY]
+    return (
+        amplitude * (math.cos(frequency * since) - 1.0),
+        amplitude * frequency * math.sin(frequency * since),
+        amplitude * frequency * frequency * math.cos(frequency * since),
+    )
+
+
+@compiled
+def _climb_filtered(parameters, state, altitude, falling, period):  # type: ignore[no-untyped-def]
+    """Advance the altitude filter, its rate kept such that the climb, less the cosine's ``falling``, obeys the limit."""
+    before = state[_Z]
+    state[_Z], state[_Z_RATE] = _filtered(parameters, _Z_PHI, state[_Z], state[_Z_RATE], altitude)
+    limit = parameters[_CLIMB_LIMIT]
+    state[CLAMPED] = 0.0
+    if abs(state[_Z_RATE] - falling) > limit:
+        state[_Z_RATE] = falling + (limit if state[_Z_RATE] > falling else -limit)
+        state[_Z] = before + state[_Z_RATE] * period
+        state[CLAMPED] = 1.0
+
+
+@compiled
 def _forward(V: float, z_dot: float) -> float:
     return math.sqrt(max(V * V - z_dot * z_dot, 0.0))
 
 
 @compiled
-def refer(parameters, commands, state, reference, now_us, period_us):  # type: ignore[no-untyped-def]
-    """Advance a profile to the tick at ``now_us`` and write its `Reference`; to be called once at every tick."""
+def refer(parameters, commands, triggers, state, reference, seen, now_us, period_us):  # type: ignore[no-untyped-def]
+    """Advance a profile to the tick at ``now_us`` and write its `Reference`; to be called once at every tick.
+
+    ``seen`` is the present forward position of the leader that `armed` names, nan if unknown; unused for the own one.
+    """
     now = now_us / 1e6
     before = (now_us - period_us) / 1e6
+    cosine, falling, cosine_ddot = _cosine(parameters, now)
     if now_us > 0:
-        old_forward = _forward(state[3], reference[4])
-        altitude, speed = _command(commands, before)
-        state[1], state[2] = _filtered(parameters, _Z_PHI, state[1], state[2], altitude)
-        state[3], state[4] = _filtered(parameters, _V_PHI, state[3], state[4], speed)
-    altitude, speed = _command(commands, now)
-    z, z_dot = state[1], state[2]
+        altitude, speed = _command(commands, triggers, state, before)
+        _climb_filtered(parameters, state, altitude, falling, period_us / 1e6)
+        state[_V], state[_V_RATE] = _filtered(parameters, _V_PHI, state[_V], state[_V_RATE], speed)
+    z, z_dot = state[_Z], state[_Z_RATE]
+    z += cosine
+    z_dot -= falling
+    V, V_dot = state[_V], state[_V_RATE]
+    frequency = parameters[_WAVE_FREQUENCY]
+    if frequency > 0.0:
+        V += parameters[_WAVE_AMPLITUDE] * math.sin(frequency * now)
+        V_dot += parameters[_WAVE_AMPLITUDE] * frequency * math.cos(frequency * now)
+    x_dot = V if parameters[_FORWARD] > 0.0 else _forward(V, z_dot)
+    if now_us > 0:
+        state[_X] += 0.5 * (reference[6] + x_dot) * period_us / 1e6
+    edge = armed(triggers, state)
+    if edge == -1:
+        seen = state[_X]
+    if edge >= -1 and seen >= triggers[int(state[_FIRED]), 1] - _ROUNDING:
+        state[_FIRED] += 1.0
+    altitude, speed = _command(commands, triggers, state, now)
     w, damping = parameters[_Z_FREQUENCY], parameters[_Z_DAMPING]
-    z_ddot = w * w * (altitude - z) - 2.0 * damping * w * z_dot
-    since = now - parameters[_COSINE_AT]
-    if since >= 0.0:
-        amplitude, frequency = parameters[_COSINE_AMPLITUDE], parameters[_COSINE_FREQUENCY]
-        z += amplitude * (math.cos(frequency * since) - 1.0)
-        z_dot -= amplitude * frequency * math.sin(frequency * since)
-        z_ddot -= amplitude * frequency * frequency * math.cos(frequency * since)
-    if now_us > 0:
-        state[0] += 0.5 * (old_forward + _forward(state[3], z_dot)) * period_us / 1e6
-    reference[0] = state[0]
-    reference[1], reference[2] = state[3], state[4]
+    z_ddot = w * w * (altitude - state[_Z]) - 2.0 * damping * w * state[_Z_RATE]
+    z_ddot -= cosine_ddot
+    if parameters[_FORWARD] > 0.0:
+        V = math.sqrt(x_dot * x_dot + z_dot * z_dot)
+        V_dot = (x_dot * V_dot + z_dot * z_ddot) / V
+    reference[0] = state[_X]
+    reference[1], reference[2] = V, V_dot
     reference[3], reference[4], reference[5] = z, z_dot, z_ddot
+    reference[6] = x_dot
 
 
-def sampled(profile: Profile, duration: float, period: float) -> Any:
-    """The profile over a flight: array (n, 6) in the order of `Reference`."""
-    parameters, commands = profile_arrays(profile, period)
-    state = new_profile_state(profile)
+def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> dict[int, Any]:
+    """The leaders' profiles over a flight, by id: arrays (n, 7) in the order of `Reference`; all leaders hear each other."""
     period_us = round(period * 1e6)
-    rows = np.zeros((int(duration / period) + 1, len(Reference._fields)))
-    row = np.zeros(len(Reference._fields))
-    for k in range(len(rows)):
-        refer(parameters, commands, state, row, k * period_us, period_us)
-        rows[k] = row
+    count = int(duration / period) + 1
+    uavs = list(profiles)
+    arrays = {uav: profile_arrays(profile, period) for uav, profile in profiles.items()}
+    triggers = {uav: trigger_rows(profile, uav, uavs) for uav, profile in profiles.items()}
+    states = {uav: new_profile_state(profile) for uav, profile in profiles.items()}
+    rows = {uav: np.zeros((count, len(Reference._fields))) for uav in uavs}
+    row = {uav: np.zeros(len(Reference._fields)) for uav in uavs}
+    for k in range(count):
+        # What each knows of the others: their last position, carried over one period.
+        known = [row[uav][0] + row[uav][6] * period for uav in uavs]
+        for uav in uavs:
+            edge = armed(triggers[uav], states[uav])
+            seen = known[edge] if edge >= 0 and k > 0 else math.nan
+            refer(*arrays[uav], triggers[uav], states[uav], row[uav], seen, k * period_us, period_us)
+            rows[uav][k] = row[uav]
     return rows
 
 
-def largest_climb(profile: Profile, duration: float) -> float:
-    """Largest abs(climb rate) of the profile, m/s, on a grid of 0.1 s."""
-    return float(np.abs(sampled(profile, duration, 0.1)[:, 4]).max())
+def largest_climb(profiles: Mapping[int, Profile], duration: float) -> float:
+    """Largest abs(climb rate) of the leaders' profiles, m/s, on a grid of 0.1 s."""
+    return max((float(np.abs(row[:, 4]).max()) for row in sampled(profiles, duration, 0.1).values()), default=0.0)
+
+
+def largest_acceleration(profiles: Mapping[int, Profile], duration: float) -> float:
+    """Largest acceleration of the leaders along either axis, m/s^2, on a grid of 0.1 s."""
+    found = [0.0]
+    for row in sampled(profiles, duration, 0.1).values():
+        found += [float(np.abs(row[:, 5]).max()), float(np.abs(np.diff(row[:, 6])).max()) / 0.1]
+    return max(found)

@@ -21,7 +21,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
-from ftcc.airside.elements.observers import disturbance_observer_rate, extrapolated, sliding_mode_observer
+from ftcc.airside.elements.neighbours import disagreement
+from ftcc.airside.elements.observers import disturbance_observer_rate, sliding_mode_observer
 from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, airspeed_model, clip, flight_path_model, pitch_rate_model
@@ -180,28 +181,6 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
 
 
 @compiled
-def _disagreement(zhat, heard, gains, ahead):  # type: ignore[no-untyped-def]
-    """sum_j a_ij (zhat_i - zhat_j), sum_j a_ij and sum_j a_ij v_j, with the neighbours carried to the present."""
-    total = 0.0
-    weights = 0.0
-    rates = 0.0
-    for j in range(heard.weight.shape[0]):
-        weight = heard.weight[j]
-        if heard.valid[j] > 0.0:
-            rate = heard.values[j, 1]
-            neighbour = extrapolated(heard.values[j, 0], rate, heard.age[j] + ahead, gains.horizon)
-        elif gains.in_flight > 0.0:
-            continue
-        else:
-            rate = 0.0
-            neighbour = gains.z_start
-        total += weight * (zhat - neighbour)
-        weights += weight
-        rates += weight * rate
-    return total, weights, rates
-
-
-@compiled
 def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[no-untyped-def]
     """One Euler step of length h, everything from the states at its beginning."""
     V = own.V
@@ -211,7 +190,9 @@ def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[
     zeta2 = gains.auxiliary * s.zeta2
 
     # Distributed observer (5.12) and shaper.
-    total, weights, rates = _disagreement(s.zhat, heard, gains, ahead)
+    total, weights, rates = disagreement(
+        s.zhat, heard, ahead, gains.horizon, gains.z_start, gains.in_flight
+    )
     zhat_rate, slope = sliding_mode_observer(total, gains.beta1, gains.beta2, gains.phi)
     if gains.shaper > 0.0:
         z_ref, v_ref, a_ref = s.z_r, s.v_r, s.a_r

@@ -1,0 +1,90 @@
+"""What a UAV makes of its neighbours' records: carried to the present, compared, averaged."""
+
+from __future__ import annotations
+
+from ftcc.link.compiled import compiled
+
+__all__ = ["disagreement", "extrapolated", "motion_sums", "weighted_average"]
+
+
+@compiled
+def extrapolated(value, rate, age, horizon):  # type: ignore[no-untyped-def]
+    """A neighbour's value carried to the present by the rate it sent, for at most ``horizon`` seconds."""
+    return value + rate * min(age, horizon)
+
+
+@compiled
+def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):  # type: ignore[no-untyped-def]
+    """sum_j a_ij (estimate - x_j), sum_j a_ij and sum_j a_ij x_j' over the neighbours, eqs. (3.20), (5.12).
+
+    x_j and its rate are the first two values of a record, carried to the present, and ``ahead`` seconds beyond it, for
+    at most ``horizon`` seconds. A neighbour not heard yet counts as ``unheard`` at rest, or is left out if
+    ``leave_out`` > 0.
+    """
+    total = 0.0
+    weights = 0.0
+    rates = 0.0
+    for j in range(heard.weight.shape[0]):
+        weight = heard.weight[j]
+        if heard.valid[j] > 0.0:
+            rate = heard.values[j, 1]
+            neighbour = extrapolated(heard.values[j, 0], rate, heard.age[j] + ahead, horizon)
+        elif leave_out > 0.0:
+            continue
+        else:
+            rate = 0.0
+            neighbour = unheard
+        total += weight * (estimate - neighbour)
+        weights += weight
+        rates += weight * rate
+    return total, weights, rates
+
+
+@compiled
+def weighted_average(heard, column, oldest):  # type: ignore[no-untyped-def]
+    """Average of the neighbours' value in ``column`` and of its rate in the next one, eqs. (4.10), (4.11).
+
+    Values are carried to the present by their rates; a neighbour whose record is older than ``oldest`` seconds, or who
+    was never heard, is left out.
+
+    Returns
+    -------
+    value, rate, weights : float
+        ``weights`` is the sum of the weights that took part; the averages are 0 where it is.
+    """
+    value = 0.0
+    rate = 0.0
+    weights = 0.0
+    for j in range(heard.weight.shape[0]):
+        if heard.valid[j] > 0.0 and heard.age[j] <= oldest:
+            weight = heard.weight[j]
+            value += weight * extrapolated(heard.values[j, column], heard.values[j, column + 1], heard.age[j], oldest)
+            rate += weight * heard.values[j, column + 1]
+            weights += weight
+    if weights == 0.0:
+        return 0.0, 0.0, 0.0
+    return value / weights, rate / weights, weights
+
+
+@compiled
+def motion_sums(heard, column):  # type: ignore[no-untyped-def]
+    """sum_j a_ij, sum_j a_ij x_j at present and sum_j a_ij x_j', for x_j in ``column`` and its rate in the next one.
+
+    With them sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs.
+    (6.22)-(6.23). A neighbour takes part from its first record on, however old.
+
+    Returns
+    -------
+    weights, positions, rates : float
+    """
+    weights = 0.0
+    positions = 0.0
+    rates = 0.0
+    for j in range(heard.weight.shape[0]):
+        if heard.valid[j] > 0.0:
+            weight = heard.weight[j]
+            rate = heard.values[j, column + 1]
+            weights += weight
+            positions += weight * (heard.values[j, column] + rate * heard.age[j])
+            rates += weight * rate
+    return weights, positions, rates

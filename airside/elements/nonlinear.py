@@ -1,0 +1,31 @@
+"""Static nonlinearities."""
+
+from __future__ import annotations
+
+import math
+
+from ftcc.link.compiled import compiled
+
+__all__ = ["limited", "sign", "signed_power"]
+
+
+@compiled
+def sign(value: float) -> float:
+    """-1, 0 or 1."""
+    if value > 0.0:
+        return 1.0
+    return -1.0 if value < 0.0 else 0.0
+
+
+@compiled
+def signed_power(value: float, exponent: float) -> float:
+    """abs(value)^exponent sign(value), eqs. (6.22), (6.32); for 0 < exponent < 1 continuous, steep at 0."""
+    return math.pow(abs(value), exponent) * sign(value)
+
+
+@compiled
+def limited(value: float, limit: float) -> float:
+    """``value`` limited to abs(value) <= limit; a limit of 0 is none."""
+    if limit <= 0.0:
+        return value
+    return min(max(value, -limit), limit)

@@ -1,0 +1,38 @@
+"""Prescribed performance: a tube that an error must not leave, and the error transformed so that its wall is at infinity."""
+
+from __future__ import annotations
+
+import math
+
+from ftcc.airside.model import clip
+from ftcc.link.compiled import compiled
+
+__all__ = ["EDGE", "performance_tube", "performance_transform"]
+
+EDGE = 0.98
+"""The transform sees at most this share of the tube: beyond it, up to and outside of the wall, it stays finite."""
+
+
+@compiled
+def performance_tube(t, first, last, decay):  # type: ignore[no-untyped-def]
+    """Half-width of the tube ``t`` seconds after its start and its rate: (first - last) exp(-decay t) + last, eq. (3.25)."""
+    excess = (first - last) * math.exp(-decay * t)
+    return excess + last, -decay * excess
+
+
+@compiled
+def performance_transform(error, error_rate, width, width_rate, lower, upper):  # type: ignore[no-untyped-def]
+    """Transformed error of a tube -lower width < error < upper width, eqs. (3.26)-(3.29), with its guard `EDGE`.
+
+    Returns
+    -------
+    share, transformed, slope, slope_rate : float
+        The share of the tube in use (as guarded), the transformed error E = 0.5 ln((lower upper + upper share) /
+        (lower upper - lower share)), xi = dE/d(error) and its rate.
+    """
+    share = clip(error / width, -EDGE * lower, EDGE * upper)
+    transformed = 0.5 * math.log((lower * upper + upper * share) / (lower * upper - lower * share))
+    slope = (lower + upper) / (2.0 * width * (lower + share) * (upper - share))
+    share_rate = (error_rate - share * width_rate) / width
+    slope_rate = slope * (-width_rate / width - share_rate / (lower + share) + share_rate / (upper - share))
+    return share, transformed, slope, slope_rate

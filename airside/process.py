@@ -1,0 +1,444 @@
+"""The autopilot process: one or several autopilots of a swarm, each a tick per state that its vehicle sends.
+
+The tick is ``sense -> hear -> refer -> control -> actuate -> tell -> report``. In real time an autopilot works on every
+state that arrives and on the newest records it has. In lockstep it waits for every record that could be usable at its
+tick and never runs ahead of those who hear it.
+"""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Sequence
+from types import ModuleType
+
+import numpy as np
+
+from ftcc.airside.autopilots import Autopilots, LinkEvents, build, link_events, sense_and_refer, set_links, tick_of
+from ftcc.airside.schemes import find
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.airside.telemetry import Reporter
+from ftcc.link.channel import Inbox, admit
+from ftcc.link.gate import Ended, Gate, Ready, Said
+from ftcc.link.mavlink import (
+    AUTOPILOT,
+    LOOPBACK,
+    Endpoint,
+    command_message,
+    dialect,
+    read_state,
+    target_message,
+)
+from ftcc.link.mesh import Mesh
+from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
+from ftcc.link.record import Record, RecordError
+from ftcc.link.recording import Column, PartWriter
+
+__all__ = ["Crew", "columns", "load_compiled", "run"]
+
+_AHEAD = 4
+"""Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
+_NOTHING_MORE = 2**31 - 1
+"""Sequence number acknowledged by a UAV that hears nobody, or has ended."""
+
+
+def columns(scheme: str) -> tuple[Column, ...]:
+    """Columns of an autopilot's part of the recording."""
+    signals = (Column(s.name, s.unit, s.meaning) for s in find(scheme).signals)
+    return (Column("t", "s", "simulated time"), Column("uav", "-", "id"), *signals)
+
+
+def run(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
+    """Fly the autopilots of this process from the launcher's go to its release."""
+    crew = Crew(specs, setting, gate)
+    try:
+        crew.meet()
+        gate.tell(Ready())
+        gate.wait_until_go()
+        crew.fly()
+    finally:
+        crew.close()
+
+
+def load_compiled(autopilots: Autopilots, inbox: Inbox, events: LinkEvents, law: ModuleType) -> None:
+    """Load, or compile, the functions of a tick before the flight."""
+    k = len(autopilots.own)
+    nobody, state, controls = np.zeros(k, np.int64), np.zeros((k, 13)), np.zeros((k, 4))
+    sense_and_refer(autopilots, nobody, state, controls, 0, 1)
+    law.hear_and_control(autopilots, inbox, nobody, controls, nobody, 0, 1)
+    set_links(events, inbox, -1)
+    admit(inbox, 0, 0, -1, 0, True, autopilots.shared[0], 0, 0, 0)
+
+
+class _Link:
+    """An in-edge as its receiver manages it: raw records that are not due yet, and what is known of the sender."""
+
+    def __init__(self) -> None:
+        self.pending: collections.deque[Record] = collections.deque()
+        self.newest = -1
+        """Sequence number of the newest record received."""
+        self.ended = False
+        """The sender has ended: nothing more will come."""
+
+
+class Crew:
+    """The autopilots of a process."""
+
+    def __init__(self, specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
+        self.specs = specs
+        self.setting = setting
+        self.timing = setting.timing
+        self.gate = gate
+        self.index = {spec.uav: i for i, spec in enumerate(specs)}
+        self.autopilots, self.inbox = build(specs, self.timing)
+        self.events = link_events(specs)
+        self.law = tick_of(specs[0].scheme)
+        k = len(specs)
+        self.alive = np.ones(k, np.int64)
+        self.messages = np.zeros((k, 13))
+        self.reported = np.zeros((k, 4))
+        self.controls = np.zeros((k, 4))
+        self.ok = np.ones(k, np.int64)
+        self.states: list[collections.deque[tuple[int, np.ndarray, np.ndarray]]] = [collections.deque() for _ in specs]
+        self.done = np.full(k, -1, np.int64)
+        """Last tick of each autopilot."""
+        self.links = [{n.uav: _Link() for n in spec.neighbours} for spec in specs]
+        self.edge = [{n.uav: e for e, n in enumerate(spec.neighbours)} for spec in specs]
+        self.acknowledged: dict[int, int] = {}
+        """Lockstep: what each hearer outside this process has acknowledged."""
+        self.bad_records = 0
+        ports = [setting.ports[spec.uav] for spec in specs]
+        self.vehicles = [
+            Endpoint(spec.uav, AUTOPILOT, port.autopilot, (LOOPBACK, port.vehicle))
+            for spec, port in zip(specs, ports, strict=True)
+        ]
+        self.reporters = [Reporter(spec, port.ground, setting.station) for spec, port in zip(specs, ports, strict=True)]
+        self.parts = {
+            i: PartWriter(setting.folder / "parts" / f"{spec.uav}-autopilot.arrows", columns(spec.scheme))
+            for i, spec in enumerate(specs)
+            if spec.role == "follower"
+        }
+        self.mesh = self._open_mesh()
+        self.telemetry = [Telemetry(self.timing) for _ in specs]
+        self.stall = Stall()
+        self.waiter = Waiter()
+        for source in (gate, *self.vehicles, *([self.mesh] if self.mesh else [])):
+            self.waiter.add(source)
+        load_compiled(self.autopilots, self.inbox, self.events, self.law)
+
+    def _open_mesh(self) -> Mesh | None:
+        """The process's peer, or None if all its neighbours are in this very process."""
+        own = set(self.index)
+        hears = {n.uav for spec in self.specs for n in spec.neighbours} - own
+        hearers = {(spec.uav, uav) for spec in self.specs for uav in spec.hearers if uav not in own}
+        if not hears and not hearers:
+            return None
+        linked = hears | {uav for _, uav in hearers}
+        if self.setting.lockstep:
+            # Acknowledgements travel with the hearers' own records, so an edge is subscribed to at both ends.
+            senders = {(spec.uav, n.uav) for spec in self.specs for n in spec.neighbours if n.uav not in own}
+            self.acknowledged = {uav: -1 for _, uav in hearers}
+            hears, hearers = linked, hearers | senders
+        # A peer listens on the port of its process's first UAV; of two peers the later one connects.
+        me = self.specs[0].uav
+        peers = {self.setting.peer_of[uav] for uav in linked}
+        connect = [self.setting.ports[peer].mesh for peer in sorted(peers) if peer < me]
+        listen = self.setting.ports[me].mesh if any(peer > me for peer in peers) else None
+        return Mesh(self.setting.swarm, own, hears, hearers, listen, connect, self.setting.lockstep)
+
+    def meet(self) -> None:
+        """Wait until all who hear this process's UAVs have subscribed."""
+        self.stall.progress()
+        while self.mesh and not self.mesh.ready:
+            self.gate.read()
+            if self.gate.stopping:
+                return
+            self.waiter.wait(0.2)
+            self.take_records()
+            if self.stall.long:
+                self.gate.tell(Said("warning", f"mesh: still waiting for {', '.join(self.mesh.awaited)}"))
+
+    def fly(self) -> None:
+        """All ticks, or until everybody is lost or the launcher stops the flight."""
+        if self.setting.lockstep:
+            self.fly_in_lockstep()
+        else:
+            self.fly_in_real_time()
+        for i in range(len(self.specs)):
+            self.end(i)
+        for part in self.parts.values():
+            part.close()
+        flown = int(self.done.max()) + 1
+        self.gate.tell(Ended(flown, 0, flown * len(self.specs)))
+        self.gate.wait_until_released(60.0)
+
+    def fly_in_lockstep(self) -> None:
+        """Everybody in this process does tick k before anybody does k+1."""
+        for tick in range(self.timing.ticks + 1):
+            if not self.wait(tick) or not self.alive.any():
+                return
+            for i in range(len(self.specs)):
+                if self.alive[i]:
+                    _, self.messages[i], self.reported[i] = self.states[i].popleft()
+            self.tick(tick, self.alive)
+
+    def fly_in_real_time(self) -> None:
+        """Each autopilot works on the states of its vehicle as they arrive."""
+        one = np.zeros_like(self.alive)
+        while self.alive.any() and not self.gate.stopping:
+            self.waiter.wait(0.2)
+            self.gate.read()
+            self.listen()
+            self.take_records()
+            for i in range(len(self.specs)):
+                while self.alive[i] and self.states[i]:
+                    tick, self.messages[i], self.reported[i] = self.states[i].popleft()
+                    one[:] = 0
+                    one[i] = 1
+                    self.tick(tick, one)
+            if (self.done[self.alive == 1] >= self.timing.ticks).all():
+                return
+
+    # The tick.
+
+    def tick(self, tick: int, active: np.ndarray) -> None:
+        """One tick of the ``active`` autopilots."""
+        self.sense_and_refer(tick, active)
+        self.hear(tick, active)
+        self.control(tick, active)
+        self.actuate(tick, active)
+        if tick % self.timing.exchange_every == 0:
+            self.tell(tick, active)
+        self.report(tick, active)
+
+    def sense_and_refer(self, tick: int, active: np.ndarray) -> None:
+        """Own state from the vehicle's message; the leaders' profiles."""
+        sense_and_refer(
+            self.autopilots, active, self.messages, self.reported, self.now_us(tick), self.timing.period_us
+        )
+
+    def hear(self, tick: int, active: np.ndarray) -> None:
+        """Link events, then the records that are due, through the channel into the inbox."""
+        now = self.now_us(tick)
+        events = self.events
+        if events.position[0] < len(events.at_us) and events.at_us[events.position[0]] <= now:
+            set_links(events, self.inbox, now)
+        for i in np.flatnonzero(active):
+            for sender, link in self.links[i].items():
+                while link.pending and link.pending[0].stamp_us + self.timing.latency_us <= now:
+                    record = link.pending.popleft()
+                    radio_on = record.radio_on and bool(events.radio_on[i])
+                    values = np.zeros(self.inbox.values.shape[2])
+                    values[: len(record.values)] = record.values
+                    admit(
+                        self.inbox,
+                        i,
+                        self.edge[i][sender],
+                        record.sequence,
+                        record.stamp_us,
+                        radio_on,
+                        values,
+                        self.timing.latency_us,
+                        now,
+                        self.timing.seed,
+                    )
+
+    def control(self, tick: int, active: np.ndarray) -> None:
+        """The law."""
+        self.law.hear_and_control(
+            self.autopilots,
+            self.inbox,
+            active,
+            self.controls,
+            self.ok,
+            self.now_us(tick),
+            self.timing.period_us,
+        )
+        for i in np.flatnonzero(active):
+            self.done[i] = tick
+            if not self.ok[i]:
+                self.give_up(i)
+
+    def actuate(self, tick: int, active: np.ndarray) -> None:
+        """Commands to the vehicles."""
+        for i in np.flatnonzero(active):
+            if not self.alive[i]:
+                continue
+            if self.specs[i].role == "leader":
+                self.vehicles[i].send(target_message(self.specs[i].uav, self.autopilots.target[i]))
+            else:
+                self.vehicles[i].send(command_message(self.now_us(tick), self.controls[i]))
+
+    def tell(self, tick: int, active: np.ndarray) -> None:
+        """A record for the neighbours: here those in this process, by the mesh the others."""
+        heard = self.heard()
+        for i in np.flatnonzero(active):
+            if self.alive[i]:
+                record = Record(
+                    self.specs[i].uav,
+                    tick // self.timing.exchange_every,
+                    self.now_us(tick),
+                    tuple(self.autopilots.shared[i].tolist()),
+                    bool(self.events.radio_on[i]),
+                    heard=heard,
+                )
+                self.publish(record)
+
+    def report(self, tick: int, active: np.ndarray) -> None:
+        """A row of the recording, and telemetry to the ground."""
+        now = self.now_us(tick)
+        for i in np.flatnonzero(active):
+            if not self.alive[i]:
+                continue
+            if i in self.parts and tick % self.timing.record_every == 0:
+                self.parts[i].row((now / 1e6, self.specs[i].uav, *self.autopilots.signals[i]))
+            if self.telemetry[i].due(tick):
+                if self.telemetry[i].heartbeat_due():
+                    self.reporters[i].heartbeat()
+                self.reporters[i].report(now, self.messages[i], self.autopilots, self.inbox, self.events, i)
+                if i in self.parts:
+                    self.parts[i].flush_if_due()
+
+    # What surrounds the tick.
+
+    def now_us(self, tick: int) -> int:
+        """Simulated time of a tick."""
+        return tick * self.timing.period_us
+
+    def publish(self, record: Record) -> None:
+        """Give a record to all who hear its sender."""
+        for links in self.links:
+            if record.uav in links:
+                self._keep(links[record.uav], record)
+        if self.mesh:
+            self.mesh.publish(record.uav, record.pack())
+
+    def _keep(self, link: _Link, record: Record) -> None:
+        if record.last:
+            link.ended = True
+        elif record.sequence > link.newest:
+            link.newest = record.sequence
+            link.pending.append(record)
+
+    def take_records(self) -> None:
+        """Sort what the mesh has brought."""
+        if self.mesh is None:
+            return
+        for payload in self.mesh.receive():
+            try:
+                record = Record.unpack(payload)
+            except RecordError as error:
+                self.bad_records += 1
+                if self.bad_records == 1:
+                    self.gate.tell(Said("warning", f"mesh: {error}"))
+                continue
+            for links in self.links:
+                if record.uav in links:
+                    self._keep(links[record.uav], record)
+            if record.uav in self.acknowledged:
+                self.acknowledged[record.uav] = _NOTHING_MORE if record.last else record.heard
+
+    def listen(self) -> None:
+        """Take in what the vehicles sent; a state that was answered already is answered once more."""
+        for i, vehicle in enumerate(self.vehicles):
+            messages = vehicle.receive()
+            while messages:
+                if messages[0].get_type() == "HEARTBEAT":
+                    if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
+                        self.end(i)
+                    messages = messages[1:]
+                    continue
+                state, controls = np.zeros(13), np.zeros(4)
+                stamp = read_state(messages[:3], state, controls)
+                messages = messages[3:]
+                newest = self.states[i][-1][0] if self.states[i] else int(self.done[i])
+                tick = stamp // self.timing.period_us
+                if stamp < 0:
+                    continue
+                if tick > newest:
+                    self.states[i].append((tick, state, controls))
+                elif tick == self.done[i]:
+                    vehicle.send_again()
+
+    def wait(self, tick: int) -> bool:
+        """Lockstep: wait until everything that tick needs is here; False if the flight is to end."""
+        self.stall.progress()
+        while True:
+            self.gate.read()
+            self.listen()
+            self.take_records()
+            if self.gate.stopping:
+                return False
+            missing = self.missing(tick)
+            if not missing:
+                return True
+            if not self.waiter.wait(RESEND):
+                for i in np.flatnonzero(self.alive):
+                    if not self.states[i]:
+                        self.vehicles[i].send_again()
+                if not self.gate.open(tick):
+                    self.stall.progress()
+                elif self.stall.long:
+                    self.gate.tell(Said("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {missing}"))
+
+    @property
+    def names(self) -> str:
+        return ", ".join(str(spec.uav) for spec in self.specs)
+
+    def missing(self, tick: int) -> str:
+        """What a tick still needs, as text; empty if nothing."""
+        due = self.now_us(tick) - self.timing.latency_us
+        needed = due // self.timing.exchange_us if due >= 0 else -1
+        for i in np.flatnonzero(self.alive):
+            if not self.states[i]:
+                return f"the state of UAV {self.specs[i].uav}"
+            for sender, link in self.links[i].items():
+                if sender not in self.index and link.newest < needed:
+                    if link.ended or sender in self.gate.gone:
+                        continue
+                    return f"record {needed} of UAV {sender}"
+        if tick % self.timing.exchange_every == 0:
+            sequence = tick // self.timing.exchange_every
+            window = _AHEAD - (-self.timing.latency_us // self.timing.exchange_us)
+            for hearer, heard in self.acknowledged.items():
+                if sequence - window > heard and hearer not in self.gate.gone:
+                    return f"UAV {hearer} to acknowledge record {sequence - window}"
+        return ""
+
+    def heard(self) -> int:
+        """Sequence number up to which everything has been received from all outside this process."""
+        newest = [
+            link.newest
+            for i in np.flatnonzero(self.alive)
+            for sender, link in self.links[i].items()
+            if sender not in self.index and not link.ended and sender not in self.gate.gone
+        ]
+        return min(newest, default=_NOTHING_MORE)
+
+    def give_up(self, i: int) -> None:
+        """The law's command is not finite: tell the vehicle, and end."""
+        self.vehicles[i].send(
+            dialect.MAVLink_heartbeat_message(
+                dialect.MAV_TYPE_FIXED_WING,
+                dialect.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                dialect.MAV_STATE_FLIGHT_TERMINATION,
+                3,
+            )
+        )
+        self.end(i)
+
+    def end(self, i: int) -> None:
+        """UAV ``i`` ends: its neighbours must not wait for it."""
+        if self.alive[i]:
+            self.alive[i] = 0
+            tick = int(self.done[i])
+            self.publish(Record(self.specs[i].uav, max(tick, 0), self.now_us(max(tick, 0)), (), last=True))
+
+    def close(self) -> None:
+        """Free the ports; leave the mesh."""
+        for endpoint in (*self.vehicles, *self.reporters):
+            endpoint.close()
+        if self.mesh:
+            self.mesh.close()
+        self.waiter.close()

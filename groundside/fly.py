@@ -1,0 +1,252 @@
+"""A flight with processes: swarm, station, recording and dashboard together, from ready to the merged run."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ftcc.groundside.launcher import Outcome, Swarm
+from ftcc.groundside.registry import Control, Entry
+from ftcc.groundside.snapshot import Event
+from ftcc.groundside.station import Station
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.ports import PortBlock
+from ftcc.link.recording import EventLog
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["FlightOptions", "fly"]
+
+_REFRESH = 0.1
+"""Least period of the dashboard and of progress, wall s."""
+_FIRST_START = 300.0
+"""Wall time that processes may need to get ready: the first start compiles, s."""
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """How to fly, as opposed to what."""
+
+    folder: Path
+    lockstep: bool = False
+    speed: float = 1.0
+    pack: int = 1
+    held: bool = False
+    viewer: str = "none"
+    """"web", "native" or "none"."""
+    open_browser: bool = False
+    record_view: bool = True
+    """Write ``swarm.rrd``."""
+
+
+@dataclass
+class _Flight:
+    """What the loop of a flight holds together."""
+
+    mission: Mission
+    swarm: Swarm
+    station: Station
+    dashboard: Any
+    log: EventLog
+    say: Callable[[Event], None]
+    next_event: int = 0
+    refreshed: float = 0.0
+
+    def note(self, event: Event) -> None:
+        """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
+        stamped = event if event.t >= 0.0 else Event(self.station.t, event.severity, event.text, event.uav)
+        self.log.write(stamped.t, stamped.text, stamped.uav, stamped.severity)
+        self.station.note(stamped)
+        self.say(stamped)
+
+    def scheduled_events(self) -> None:
+        """Note the scenario's own events as their time comes."""
+        while self.next_event < len(self.mission.events) and self.mission.events[self.next_event][0] <= self.station.t:
+            t, uav, text = self.mission.events[self.next_event]
+            self.note(Event(t, "warning", text, uav))
+            self.next_event += 1
+
+    def refresh(self, progress: Callable[[float], None]) -> None:
+        """Draw the swarm, at most ten times a second."""
+        if time.monotonic() - self.refreshed < _REFRESH:
+            return
+        self.refreshed = time.monotonic()
+        self.scheduled_events()
+        progress(self.station.t)
+        if self.dashboard is not None:
+            self.dashboard.log(self.station.snapshot())
+
+
+def fly(
+    mission: Mission,
+    options: FlightOptions,
+    ports: PortBlock,
+    say: Callable[[Event], None],
+    progress: Callable[[float], None],
+    started: Callable[[str | None], None],
+) -> Outcome:
+    """Fly ``mission`` and leave a complete run in ``options.folder``.
+
+    Parameters
+    ----------
+    say : called with every event.
+    progress : called with the simulated time, up to ten times a second.
+    started : called once everybody is ready, with the viewer's address or None.
+
+    Ctrl-C and SIGTERM end the flight in order.
+    """
+    folder = options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "scenario.toml").write_text(mission.toml)
+    flight: _Flight
+
+    def on_event(event: Event) -> None:
+        flight.note(event)
+
+    swarm = Swarm(
+        mission,
+        folder,
+        ports,
+        lockstep=options.lockstep,
+        speed=options.speed,
+        pack=options.pack,
+        held=options.held,
+        on_event=on_event,
+    )
+    # The fork server must exist before this process opens anything.
+    swarm.start()
+    signals = [signal_.name for signal_ in mission.scheme.signals]
+    station = Station(ports.station, [spec.uav for spec in mission.vehicles], signals, folder / "telemetry.tlog")
+    log = EventLog(folder / "events.jsonl")
+    flight = _Flight(mission, swarm, station, None, log, say)
+    control = None
+    with _stopping_on_signals(swarm):
+        try:
+            flight.dashboard = _dashboard(mission, options, ports)
+            address = flight.dashboard.address if flight.dashboard else None
+            control = Control(_entry(mission, folder, ports, address), lambda what, how: _obey(swarm, what))
+            _loop(flight, lambda: swarm.ready, control, _FIRST_START, lambda t: None)
+            started(address)
+            swarm.go()
+            _loop(flight, lambda: swarm.over, control, None, progress)
+            station.read()
+            flight.refreshed = 0.0
+            flight.refresh(progress)
+        finally:
+            swarm.stop()
+            _loop(flight, lambda: swarm.over, None, 5.0, lambda t: None)
+            swarm.release()
+            station.close()
+            if control:
+                control.close()
+            if flight.dashboard:
+                flight.dashboard.close()
+            ports.release()
+    log.write(
+        station.t,
+        f"flight over: {swarm.outcome.late} of {swarm.outcome.ticks} ticks late",
+        late=swarm.outcome.late,
+        ticks=swarm.outcome.ticks,
+    )
+    log.close()
+    return swarm.outcome
+
+
+def _loop(
+    flight: _Flight,
+    done: Callable[[], bool],
+    control: Control | None,
+    seconds: float | None,
+    progress: Callable[[float], None],
+) -> None:
+    """Attend to everybody until ``done`` or, at most, for ``seconds``; a stop ends the wait for readiness too."""
+    until = None if seconds is None else time.monotonic() + seconds
+    waiting_for_ready = done() is False and seconds == _FIRST_START
+    while not done():
+        if until is not None and time.monotonic() > until:
+            if waiting_for_ready:
+                names = ", ".join(child.name for child in flight.swarm.children if not child.ready)
+                raise TimeoutError(f"not ready after {seconds:.0f} s: {names}; see the logs in {flight.swarm.folder}")
+            return
+        if waiting_for_ready and flight.swarm.stopping_since is not None:
+            return
+        sources = [*flight.swarm.sources(), flight.station, *([control] if control else [])]
+        wait(sources, _REFRESH)
+        flight.swarm.attend()
+        flight.station.read()
+        if control:
+            control.serve()
+        flight.refresh(progress)
+
+
+def _obey(swarm: Swarm, command: str) -> None:
+    """A command from the control socket."""
+    if command == "stop":
+        swarm.stop()
+    elif command == "resume":
+        swarm.resume()
+    else:
+        raise ValueError(f"unknown command {command!r}; known: stop, resume")
+
+
+def _entry(mission: Mission, folder: Path, ports: PortBlock, address: str | None) -> Entry:
+    return Entry(
+        name=folder.name,
+        pid=os.getpid(),
+        scenario=mission.name,
+        folder=str(folder.resolve()),
+        uavs=len(mission.vehicles),
+        ports=(ports.base, ports.base + ports.size - 1),
+        viewer=address,
+        started=time.time(),
+    )
+
+
+def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> Any:
+    """The dashboard, or None where nothing is to be shown or recorded."""
+    recording = options.folder / "swarm.rrd" if options.record_view else None
+    if options.viewer == "none" and recording is None:
+        return None
+    from ftcc.groundside.dashboard import Dashboard
+
+    follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
+    limits = dict(zip(ACTUATORS, follower.limits, strict=True))
+    return Dashboard(
+        title=mission.title,
+        graph=mission.graph,
+        signals=mission.scheme.signals,
+        limits=limits,
+        leaders=mission.graph.leaders,
+        followers=mission.graph.followers,
+        recording=recording,
+        viewer=options.viewer,
+        ports=ports.viewer,
+        open_browser=options.open_browser,
+    )
+
+
+@contextlib.contextmanager
+def _stopping_on_signals(swarm: Swarm) -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the flight in order; elsewhere than in the main thread signals are not ours."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(_number: int, _frame: Any) -> None:
+        swarm.stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

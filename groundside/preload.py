@@ -1,0 +1,72 @@
+"""Imported once by the fork server: what every process of a swarm needs, compiled or loaded, before it is forked.
+
+No socket, no thread, no Zenoh, Rerun or pyarrow here.
+"""
+
+from __future__ import annotations
+
+import os
+
+from ftcc.airside import process as autopilot_process
+from ftcc.airside.autopilots import build as build_autopilots
+from ftcc.airside.autopilots import link_events, tick_of
+from ftcc.airside.model import Model
+from ftcc.airside.scheme import Reference
+from ftcc.airside.schemes import find
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.channel import Channel
+from ftcc.link.timing import Timing
+from ftcc.sim import process as vehicle_process
+from ftcc.sim.airframe import Airframe
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.spec import VehicleSpec
+from ftcc.sim.spec import build as build_vehicles
+
+__all__ = ["SCHEME_VARIABLE", "load"]
+
+SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
+"""Environment variable that names the scheme to load."""
+
+
+def load(scheme: str) -> None:
+    """Load, or compile, everything that a swarm of ``scheme`` runs."""
+    law = find(scheme)
+    nothing = AutopilotSpec(
+        uav=1,
+        role="follower",
+        scheme=scheme,
+        gains=(0.0,) * len(law.gains_type._fields),
+        model=Model(*(0.0,) * len(Model._fields)),
+        travel=(0.0,) * len(ACTUATORS),
+        mission=Reference(*(0.0,) * len(Reference._fields)),
+        neighbours=(),
+        channel=Channel(),
+    )
+    autopilots, inbox = build_autopilots([nothing], Timing(1, 1, 1, 1, 1, 1, 1))
+    autopilot_process.load_compiled(autopilots, inbox, link_events([nothing]), tick_of(scheme))
+    vehicle_process.load_compiled(
+        build_vehicles(
+            [
+                VehicleSpec(
+                    uav=1,
+                    kind="longitudinal",
+                    airframe=Airframe(*(1.0,) * len(Airframe._fields)),
+                    initial=(1.0,) + (0.0,) * 5,
+                    command=(0.0,) * len(ACTUATORS),
+                    limits=((0.0, 0.0),) * len(ACTUATORS),
+                    lag=(0.0,) * len(ACTUATORS),
+                    fault_before_lag=False,
+                    faults=(),
+                    disturbances=(),
+                    noise=(0.0,) * len(TRUTH),
+                    guards=(0.0, 1.0, 1.0),
+                    offset=0.0,
+                )
+            ]
+        )
+    )
+
+
+if SCHEME_VARIABLE in os.environ:
+    load(os.environ[SCHEME_VARIABLE])

@@ -1,0 +1,151 @@
+"""The list of running swarms of this user, and the socket by which each can be told what to do."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ftcc.link.ports import runtime_folder
+
+__all__ = ["Control", "Entry", "find", "running", "tell"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A running swarm."""
+
+    name: str
+    pid: int
+    scenario: str
+    folder: str
+    uavs: int
+    ports: tuple[int, int]
+    """First and last port of its block."""
+    viewer: str | None
+    started: float
+    """Wall time, s since 1970."""
+
+
+def _card(name: str) -> Path:
+    return runtime_folder() / f"{name}.json"
+
+
+def _socket_path(name: str) -> Path:
+    return runtime_folder() / f"{name}.sock"
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def running() -> list[Entry]:
+    """All swarms whose launcher is alive; cards of dead launchers are removed."""
+    found = []
+    for path in sorted(runtime_folder().glob("*.json")):
+        try:
+            data = json.loads(path.read_text())
+            entry = Entry(**{**data, "ports": tuple(data["ports"])})
+        except (ValueError, TypeError, KeyError, FileNotFoundError):
+            continue  # being written or removed at this very moment, or not ours
+        if _alive(entry.pid):
+            found.append(entry)
+        else:
+            for stale in (path, _socket_path(entry.name)):
+                stale.unlink(missing_ok=True)
+    return found
+
+
+def find(name: str | None) -> Entry:
+    """The running swarm called ``name``, or the only one.
+
+    Raises
+    ------
+    LookupError
+        If there is no such swarm, or ``name`` was needed to choose.
+    """
+    entries = running()
+    names = ", ".join(entry.name for entry in entries) or "none"
+    if name is None:
+        if len(entries) == 1:
+            return entries[0]
+        raise LookupError(
+            "no swarm is running" if not entries else f"several swarms are running, name one of them: {names}"
+        )
+    for entry in entries:
+        if entry.name == name:
+            return entry
+    raise LookupError(f"no swarm {name!r} is running; running: {names}")
+
+
+def tell(entry: Entry, command: str, **arguments: Any) -> Any:
+    """Tell a swarm what to do and return its answer.
+
+    Raises
+    ------
+    RuntimeError
+        If it refuses.
+    OSError
+        If it does not answer.
+    """
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(5.0)
+        link.connect(str(_socket_path(entry.name)))
+        link.sendall(json.dumps({"command": command, **arguments}).encode() + b"\n")
+        answer = json.loads(link.makefile().readline())
+    if not answer.get("ok"):
+        raise RuntimeError(answer.get("error", "refused"))
+    return answer.get("value")
+
+
+class Control:
+    """The launcher's end: a card in the list and a socket that takes commands, a JSON object a line."""
+
+    def __init__(self, entry: Entry, handle: Callable[[str, dict[str, Any]], Any]) -> None:
+        self._entry = entry
+        self._handle = handle
+        self._path = _socket_path(entry.name)
+        self._path.unlink(missing_ok=True)
+        self._server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._server.bind(str(self._path))
+        self._server.listen()
+        self._server.setblocking(False)
+        card = _card(entry.name)
+        card.with_suffix(".new").write_text(json.dumps(asdict(entry)))
+        card.with_suffix(".new").rename(card)
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return self._server.fileno()
+
+    def serve(self) -> None:
+        """Answer one caller; a caller that sends nonsense, or nothing for half a second, is turned away."""
+        with contextlib.suppress(BlockingIOError):
+            link, _ = self._server.accept()
+            with link:
+                link.settimeout(0.5)
+                try:
+                    request = json.loads(link.makefile().readline())
+                    command = request.pop("command")
+                    answer = {"ok": True, "value": self._handle(command, request)}
+                except (ValueError, KeyError, AttributeError, OSError) as error:
+                    answer = {"ok": False, "error": str(error)}
+                with contextlib.suppress(OSError):
+                    link.sendall(json.dumps(answer).encode() + b"\n")
+
+    def close(self) -> None:
+        """Leave the list."""
+        self._server.close()
+        _card(self._entry.name).unlink(missing_ok=True)
+        self._path.unlink(missing_ok=True)

@@ -1,0 +1,402 @@
+"""What may stand in a scenario and in an airframe sheet: every field with its unit and range.
+
+`scenario` reads the files and merges forms and variants; `mission` turns the result into what the processes are told.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+__all__ = [
+    "AirframeSheet",
+    "ChannelFields",
+    "Claim",
+    "DisturbanceFields",
+    "EdgeFields",
+    "FaultFields",
+    "LeaderFields",
+    "LinkEventFields",
+    "Plan",
+    "Start",
+]
+
+Id = Annotated[int, Field(ge=1, le=200)]
+"""MAVLink system id of a UAV."""
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Actuator = Literal["thrust", "elevator", "aileron", "rudder"]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class Strict(BaseModel):
+    """Fields that are not listed, nan and inf are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class AirframeSheet(Strict):
+    """An airframe's coefficients (SI units, rad); the names are those of the monograph's (2.1)-(2.7)."""
+
+    title: str = ""
+    m: Positive
+    g: Positive
+    rho: Positive
+    S: Positive
+    c: Positive
+    b: Positive
+    Ix: Positive
+    Iy: Positive
+    Iz: Positive
+    Ixz: float
+    T_max: Positive
+    CL0: float
+    CLa: Positive
+    CLde: float
+    CD0: NotNegative
+    CDa: float
+    CDa2: float
+    Cm0: float
+    Cma: float
+    Cmde: float
+    Cmq: float
+    CY0: float
+    CYb: float
+    Cl0: float
+    Clb: float
+    Clda: float
+    Cldr: float
+    Clp: float
+    Clr: float
+    Cn0: float
+    Cnb: float
+    Cnda: float
+    Cndr: float
+    Cnp: float
+    Cnr: float
+
+
+class Uavs(Strict):
+    """Who flies: ids, leaders after followers."""
+
+    followers: list[Id] = Field(min_length=1)
+    leaders: list[Id] = []
+
+
+class Rates(Strict):
+    """The time grid. Ideal exchange (form "monograph") has no exchange period and no latency of its own."""
+
+    control_rate: float = Field(gt=0.0, le=2000.0, description="Hz")
+    exchange_rate: float | None = Field(None, gt=0.0, le=2000.0, description="Hz, records to the neighbours")
+    latency: float | None = Field(None, ge=0.0, description="s, link latency; default: one exchange period")
+    plant_step: float = Field(0.001, gt=0.0, le=0.01, description="s, integration step of the plant")
+
+
+class EdgeFields(Strict):
+    """An edge of the communication graph: ``between`` two UAVs (both ways), or ``from`` a sender ``to`` a receiver."""
+
+    between: tuple[int, int] | None = None
+    sender: int | None = Field(None, alias="from")
+    receiver: int | None = Field(None, alias="to")
+    weight: float = Field(gt=0.0, description="a_ij of the monograph")
+
+    @model_validator(mode="after")
+    def _one_way_of_saying(self) -> Self:
+        both = self.between is not None
+        directed = (self.sender is not None, self.receiver is not None)
+        if both == any(directed) or any(directed) != all(directed):
+            raise ValueError("needs either between = [a, b], or from = a and to = b")
+        return self
+
+    @property
+    def directed(self) -> list[tuple[int, int]]:
+        """Pairs (receiver, sender)."""
+        if self.between is not None:
+            a, b = self.between
+            return [(a, b), (b, a)]
+        assert self.receiver is not None and self.sender is not None
+        return [(self.receiver, self.sender)]
+
+
+class GraphFields(Strict):
+    """The communication graph."""
+
+    edges: list[EdgeFields] = []
+
+
+class ChannelFields(Strict):
+    """Quality of the radio links."""
+
+    loss: Probability = Field(0.0, description="probability of loss of a record, independent")
+    burst_start: Probability = Field(0.0, description="probability per record of entering a burst")
+    burst_end: Probability = Field(1.0, description="probability per record of leaving it")
+    burst_loss: Probability = Field(1.0, description="probability of loss within a burst")
+    delay: float = Field(0.0, ge=0.0, description="s, beyond the link latency")
+    jitter: float = Field(0.0, ge=0.0, description="s, further delay, uniform in [0, jitter]")
+
+
+class LinkEventFields(Strict):
+    """A change of the radio of one UAV, or of one edge, from ``at`` to ``until``."""
+
+    at: float = Field(ge=0.0, description="s")
+    until: float | None = Field(None, description="s; without it the change is for good")
+    kind: Literal["cut", "degrade"]
+    uav: Id | None = None
+    edge: tuple[Id, Id] | None = Field(None, description="[sender, receiver]")
+    directed: bool = Field(False, description="only sender -> receiver")
+    loss: Probability | None = None
+    burst_start: Probability | None = None
+    burst_end: Probability | None = None
+    burst_loss: Probability | None = None
+    delay: float | None = Field(None, ge=0.0, description="s")
+    jitter: float | None = Field(None, ge=0.0, description="s")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.uav is None) == (self.edge is None):
+            raise ValueError("needs either uav = n or edge = [sender, receiver]")
+        if self.until is not None and self.until <= self.at:
+            raise ValueError(f"until = {self.until:g} must be later than at = {self.at:g}")
+        if self.directed and self.edge is None:
+            raise ValueError("directed goes with edge")
+        if bool(self.changes) != (self.kind == "degrade"):
+            allowed = ", ".join(ChannelFields.model_fields)
+            raise ValueError(f'kind = "degrade" needs, and only it takes, some of {allowed}')
+        return self
+
+    @property
+    def changes(self) -> dict[str, float]:
+        """The channel parameters that are given."""
+        given = {name: getattr(self, name) for name in ChannelFields.model_fields}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+class Lag(Strict):
+    """First-order lag of each actuator, rad/s; 0 = none."""
+
+    thrust: float = Field(0.0, ge=0.0)
+    elevator: float = Field(0.0, ge=0.0)
+    aileron: float = Field(0.0, ge=0.0)
+    rudder: float = Field(0.0, ge=0.0)
+
+
+class Limits(Strict):
+    """Travel of each actuator: [lowest, highest], N and rad."""
+
+    thrust: tuple[float, float] | None = None
+    elevator: tuple[float, float] | None = None
+    aileron: tuple[float, float] | None = None
+    rudder: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for name in type(self).model_fields:
+            pair = getattr(self, name)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{name} = {list(pair)}: the lower limit must be below the upper one")
+        return self
+
+
+class Guards(Strict):
+    """Where the model ends: beyond these an aircraft counts as lost."""
+
+    least_airspeed: float = Field(3.0, gt=0.0, description="m/s")
+    flight_path_angle: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
+    angle_of_attack: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
+
+
+class Plant(Strict):
+    """Options of the true aircraft."""
+
+    elevator_lift: bool = Field(True, description="false: CLde = 0")
+    lag: Lag = Lag()
+    limits: Limits
+    fault: Literal["after_lag", "before_lag"] = "after_lag"
+    initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
+        "trim", description="position, and command in force before the first one arrives; N, rad"
+    )
+    guards: Guards = Guards()
+
+
+class Start(Strict):
+    """State at t = 0."""
+
+    V: float | None = Field(None, gt=0.0, description="m/s, airspeed")
+    x: float | None = Field(None, description="m, forward position")
+    y: float | None = Field(None, description="m, lateral position; constant in the vertical plane")
+    z: float | None = Field(None, description="m, altitude")
+    gamma: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, flight-path angle")
+    theta: float | Literal["trim"] | None = Field(None, description="rad, pitch angle")
+    q: float | None = Field(None, description="rad/s, pitch rate")
+
+
+class Starts(Start):
+    """State of the followers at t = 0, and where single UAVs differ."""
+
+    uav: dict[Id, Start] = {}
+
+
+class MissionFields(Strict):
+    """What every follower knows without being told."""
+
+    V: float = Field(gt=0.0, description="m/s, the mission's speed")
+
+
+class Filter(Strict):
+    """Second-order filter."""
+
+    frequency: float = Field(gt=0.0, description="rad/s")
+    damping: float = Field(gt=0.0)
+
+
+class CommandFields(Strict):
+    """From ``at`` on, or once leader ``uav`` has passed ``x``: another altitude, another speed."""
+
+    at: float | None = Field(None, ge=0.0, description="s")
+    uav: Id | None = None
+    x: float | None = Field(None, description="m, forward position")
+    altitude: float | None = Field(None, description="m; default: as before")
+    speed: float | None = Field(None, gt=0.0, description="m/s; default: as before")
+
+    @model_validator(mode="after")
+    def _by_time_or_position(self) -> Self:
+        if (self.at is None) == (self.x is None):
+            raise ValueError("needs either at = seconds, or x = position (and uav = the leader that passes it)")
+        return self
+
+
+class CosineFields(Strict):
+    """amplitude (cos(frequency (t - at)) - 1) added to the altitude from ``at`` on."""
+
+    at: float = Field(ge=0.0, description="s")
+    amplitude: float = Field(description="m")
+    frequency: float = Field(gt=0.0, description="rad/s")
+
+
+class WaveFields(Strict):
+    """amplitude sin(frequency t) added to the speed."""
+
+    amplitude: float = Field(description="m/s")
+    frequency: float = Field(gt=0.0, description="rad/s")
+
+
+class LeaderFields(Strict):
+    """A leader's commanded motion."""
+
+    x: float = Field(0.0, description="m, forward position at the start")
+    y: float = Field(0.0, description="m, lateral position")
+    z: float = Field(description="m, altitude at the start")
+    V: float = Field(gt=0.0, description="m/s, speed at the start")
+    commands: list[CommandFields] = []
+    altitude_filter: Filter = Filter(frequency=0.05, damping=0.9)
+    speed_filter: Filter = Filter(frequency=0.05, damping=0.95)
+    cosine: CosineFields | None = None
+    speed_wave: WaveFields | None = None
+    forward: bool = Field(False, description="speeds are forward speeds instead of airspeeds")
+    climb_limit: float | None = Field(None, gt=0.0, description="m/s, largest climb rate of the profile")
+
+
+class DisturbanceFields(Strict):
+    """Constant disturbances from ``at`` on."""
+
+    at: float = Field(ge=0.0, description="s")
+    d1: float = Field(0.0, description="m/s^2, of the airspeed")
+    d2: float = Field(0.0, description="rad/s, of the flight-path angle")
+    d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
+    onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
+    uavs: list[Id] | None = Field(None, description="default: all followers")
+
+
+class FaultFields(Strict):
+    """From ``at`` on an actuator acts as effectiveness * position + bias."""
+
+    at: float = Field(ge=0.0, description="s")
+    uav: Id
+    actuator: Actuator
+    effectiveness: Probability = 1.0
+    bias: float = Field(0.0, description="rad or N")
+    effectiveness_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
+    bias_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
+    without_trim: bool = Field(False, description="true: fly it although it leaves no level trim")
+
+
+class NoiseFields(Strict):
+    """White measurement noise: standard deviation of each channel at every sample."""
+
+    factor: float = Field(1.0, ge=0.0, description="multiplies all of them")
+    x: float = Field(0.0, ge=0.0, description="m")
+    y: float = Field(0.0, ge=0.0, description="m")
+    z: float = Field(0.0, ge=0.0, description="m")
+    V: float = Field(0.0, ge=0.0, description="m/s")
+    gamma: float = Field(0.0, ge=0.0, description="rad")
+    chi: float = Field(0.0, ge=0.0, description="rad")
+    mu: float = Field(0.0, ge=0.0, description="rad")
+    beta: float = Field(0.0, ge=0.0, description="rad")
+    theta: float = Field(0.0, ge=0.0, description="rad")
+    p: float = Field(0.0, ge=0.0, description="rad/s")
+    q: float = Field(0.0, ge=0.0, description="rad/s")
+    r: float = Field(0.0, ge=0.0, description="rad/s")
+
+
+class Claim(Strict):
+    """A number that a flight must show. ``expected`` is keyed by case; a case that is not listed has no such claim."""
+
+    name: str
+    metric: str
+    signal: str = Field(description="arithmetic expression over columns of the recording")
+    uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
+    window: tuple[float, float] = Field(description="s, both ends included")
+    threshold: float | dict[str, float] | None = Field(None, description="for the metrics that need one; by case")
+    unit: str = ""
+    source: str
+    expected: dict[str, float | list[float]]
+    tolerance: str | dict[str, str] = Field(description='"15 %", "0.02", "< 0.05", "> 2" or "< 1.5 x"; by case')
+
+    @model_validator(mode="after")
+    def _window_in_order(self) -> Self:
+        if self.window[1] < self.window[0]:
+            raise ValueError(f"window = {list(self.window)}: must not end before it begins")
+        return self
+
+
+class Flown(Strict):
+    """How a scenario that a run recorded came about."""
+
+    name: str
+    form: str
+    variants: list[str] = []
+    settings: list[str] = []
+    versions: dict[str, str] = {}
+
+
+class Plan(Strict):
+    """A scenario after its form, variants and settings have been merged."""
+
+    title: str
+    scheme: str
+    airframe: str = "reference_25kg"
+    duration: float = Field(gt=0.0, le=1e5, description="s")
+    seed: int = Field(1, ge=0, lt=2**63)
+    record_rate: float = Field(100.0, gt=0.0, le=2000.0, description="Hz")
+    uavs: Uavs
+    rates: Rates
+    graph: GraphFields
+    channel: ChannelFields = ChannelFields()
+    plant: Plant
+    start: Starts
+    mission: MissionFields
+    leaders: dict[Id, LeaderFields] = {}
+    gains: dict[str, float] = {}
+    switches: dict[str, bool] = {}
+    disturbances: list[DisturbanceFields] = []
+    faults: list[FaultFields] = []
+    link_events: list[LinkEventFields] = []
+    noise: NoiseFields = NoiseFields()
+    claims: list[Claim] = []
+    flown: Flown | None = None
+
+
+def fields_of(model: Any) -> list[str]:
+    """Names of the fields of a model as they stand in a file."""
+    return [field.alias or name for name, field in model.model_fields.items()]

@@ -1,0 +1,124 @@
+"""The ground station's ear: hears all vehicles of a swarm on one port, keeps a log, and knows the swarm's state."""
+
+from __future__ import annotations
+
+import math
+import struct
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ftcc.airside.telemetry import LINK_FIELDS
+from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.mavlink import STATION, Endpoint
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.process import TRUTH_ARRAY
+
+__all__ = ["Station"]
+
+_SEVERITIES = ("error",) * 4 + ("warning",) * 2 + ("info",) * 2
+"""MAV_SEVERITY 0..7 in our words."""
+
+
+@dataclass
+class _Heard:
+    """Latest telemetry of one UAV."""
+
+    t: float = 0.0
+    truth: dict[str, float] = field(default_factory=dict)
+    signals: dict[str, float] = field(default_factory=dict)
+    links: dict[int, LinkState] = field(default_factory=dict)
+    heartbeat: float = -math.inf
+    """Wall time of the last HEARTBEAT (monotonic, s)."""
+
+
+class Station:
+    """Receives telemetry on ``port``; writes it to ``log`` as a .tlog if given."""
+
+    def __init__(self, port: int, uavs: Iterable[int], signals: Sequence[str], log: Path | None = None) -> None:
+        self._endpoint = Endpoint(STATION, 1, port)
+        self._endpoint.enlarge_buffer()
+        self._uavs = {uav: _Heard() for uav in uavs}
+        self._signals = signals
+        self._log = log.open("ab") if log else None
+        self._events: list[Event] = []
+        self.t = 0.0
+        """Newest simulated time heard, s."""
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return self._endpoint.fileno()
+
+    def close(self) -> None:
+        """Free the port, finish the log."""
+        self._endpoint.close()
+        if self._log:
+            self._log.close()
+            self._log = None
+
+    def read(self) -> None:
+        """Take in all telemetry that has arrived."""
+        for message in self._endpoint.receive():
+            self._write(message)
+            heard = self._uavs.get(message.get_srcSystem())
+            if heard is not None:
+                self._take(heard, message)
+
+    def _write(self, message: Any) -> None:
+        if self._log:
+            self._log.write(struct.pack(">Q", int(time.time() * 1e6)) + bytes(message.get_msgbuf()))
+
+    def _take(self, heard: _Heard, message: Any) -> None:
+        kind = message.get_type()
+        if kind == "DEBUG_FLOAT_ARRAY":
+            name = message.name.rstrip("\0")
+            if name == "truth":
+                heard.t = message.time_usec / 1e6
+                self.t = max(self.t, heard.t)
+                heard.truth = dict(zip(TRUTH_ARRAY, message.data, strict=False))
+            elif name == "signals":
+                heard.signals = dict(zip(self._signals, message.data, strict=False))
+            elif name == "links":
+                heard.links = _links(message.data)
+        elif kind == "HEARTBEAT":
+            heard.heartbeat = time.monotonic()
+        elif kind == "STATUSTEXT":
+            self.note(Event(heard.t, _SEVERITIES[message.severity & 7], message.text, message.get_srcSystem()))
+
+    def note(self, event: Event) -> None:
+        """Add an event to the next snapshot."""
+        self._events.append(event)
+
+    def snapshot(self) -> Snapshot:
+        """The swarm as heard so far, and what happened since the last call."""
+        uavs = {uav: _state(heard) for uav, heard in self._uavs.items() if heard.truth}
+        events, self._events = tuple(self._events), []
+        return Snapshot(self.t, uavs, events)
+
+
+def _state(heard: _Heard) -> UavState:
+    truth = heard.truth
+    return UavState(
+        t=heard.t,
+        truth={name: truth[name] for name in TRUTH},
+        command={name: truth[f"{name}_command"] for name in ACTUATORS},
+        acting={name: truth[name] for name in ACTUATORS},
+        effectiveness={name: truth[f"{name}_effectiveness"] for name in ACTUATORS},
+        bias={name: truth[f"{name}_bias"] for name in ACTUATORS},
+        signals=heard.signals,
+        links=heard.links,
+        late=int(truth["late"]),
+    )
+
+
+def _links(data: Sequence[float]) -> dict[int, LinkState]:
+    size = len(LINK_FIELDS)
+    found = {}
+    for start in range(0, len(data) - size + 1, size):
+        sender, age, received, lost, cut = data[start : start + size]
+        if sender > 0:
+            found[int(sender)] = LinkState(age if age >= 0 else math.inf, int(received), int(lost), bool(cut))
+    return found

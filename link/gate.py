@@ -1,0 +1,179 @@
+"""How the launcher lets its processes go, holds them and releases them: messages over one pipe per process.
+
+A process reports `Ready`; the launcher answers `Go`. The same gate holds a swarm at a tick, sets its pace, tells that a
+UAV is gone, and releases everybody at the end. A process whose launcher dies sees its pipe close and ends.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from typing import Any
+
+__all__ = [
+    "Ended",
+    "Gate",
+    "Go",
+    "Gone",
+    "LauncherGoneError",
+    "Limit",
+    "Lost",
+    "Pace",
+    "Ready",
+    "Release",
+    "Said",
+    "Stop",
+]
+
+
+class LauncherGoneError(Exception):
+    """The pipe from the launcher has closed: this process must end."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """Process -> launcher: sockets open, neighbours subscribed, code compiled."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Process -> launcher: all ticks flown or stopped, recording flushed; ``late`` and ``skipped`` ticks."""
+
+    tick: int
+    late: int = 0
+    ticks: int = 0
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Vehicle -> launcher: the aircraft of a UAV is lost."""
+
+    uav: int
+    at_us: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Said:
+    """Process -> launcher: an event worth showing."""
+
+    severity: str
+    text: str
+    uav: int | None = None
+    at_us: int | None = None
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Launcher -> vehicle: tick ``tick`` is due at ``wall`` (monotonic clock, s), later ticks at ``speed``."""
+
+    wall: float
+    tick: int
+    speed: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Launcher -> vehicle: do not pass this tick; None = no limit."""
+
+    tick: int | None
+
+
+@dataclass(frozen=True)
+class Go:
+    """Launcher -> process: the flight begins."""
+
+    pace: Pace
+    limit: Limit
+
+
+@dataclass(frozen=True)
+class Gone:
+    """Launcher -> autopilot: the process of a neighbour has died; expect nothing more of it."""
+
+    uav: int
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Launcher -> process: end the flight now, in order."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """Launcher -> process: everybody has ended; close what others may still have needed."""
+
+
+@dataclass
+class Gate:
+    """A process's end of the pipe."""
+
+    pipe: Connection
+    pace: Pace | None = None
+    limit: int | None = 0
+    gone: set[int] = field(default_factory=set)
+    stopping: bool = False
+    released: bool = False
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return self.pipe.fileno()
+
+    def tell(self, message: Any) -> None:
+        """Say something to the launcher."""
+        try:
+            self.pipe.send(message)
+        except (BrokenPipeError, ConnectionResetError) as error:
+            raise LauncherGoneError from error
+
+    def read(self) -> None:
+        """Take in what the launcher has said.
+
+        Raises
+        ------
+        LauncherGoneError
+            If it has gone.
+        """
+        try:
+            while self.pipe.poll():
+                self._take(self.pipe.recv())
+        except (EOFError, ConnectionResetError, BrokenPipeError) as error:
+            raise LauncherGoneError from error
+
+    def _take(self, message: Any) -> None:
+        match message:
+            case Go(pace, limit):
+                self.pace, self.limit = pace, limit.tick
+            case Pace():
+                self.pace = message
+            case Limit(tick):
+                self.limit = tick
+            case Gone(uav):
+                self.gone.add(uav)
+            case Stop():
+                self.stopping = True
+            case Release():
+                self.released = True
+
+    def due(self, tick: int, period: float) -> float:
+        """Wall-clock time (monotonic, s) at which a tick of ``period`` seconds is due."""
+        assert self.pace is not None
+        return self.pace.wall + (tick - self.pace.tick) * period / self.pace.speed
+
+    def open(self, tick: int) -> bool:
+        """Whether the swarm may pass this tick."""
+        return self.limit is None or tick <= self.limit
+
+    def wait_until_go(self) -> None:
+        """Block until the flight begins or is called off."""
+        while self.pace is None and not self.stopping:
+            self.pipe.poll(None)
+            self.read()
+
+    def wait_until_released(self, seconds: float) -> None:
+        """Block until everybody has ended, at most for ``seconds``."""
+        until = time.monotonic() + seconds
+        while not self.released and time.monotonic() < until:
+            self.pipe.poll(max(0.0, until - time.monotonic()))
+            self.read()

@@ -1,0 +1,150 @@
+"""What every process of a swarm shares: how it is told what to be, waits, logs, reports and ends."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import os
+import selectors
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from ftcc.link.gate import Gate, LauncherGoneError
+from ftcc.link.ports import UavPorts
+from ftcc.link.timing import Timing
+
+__all__ = ["RESEND", "Setting", "Stall", "Telemetry", "Waiter", "process_main"]
+
+_TELEMETRY = 0.1
+"""Least period of telemetry, simulated and wall s."""
+_HEARTBEAT = 1.0
+"""Period of HEARTBEAT, wall s."""
+RESEND = 0.05
+"""Wall time after which a datagram that was not answered is sent again (lockstep), s."""
+_STALL = 10.0
+"""Wall time without progress after which a process says for whom it waits, s."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a process knows of its run beside its own UAVs."""
+
+    swarm: str
+    timing: Timing
+    lockstep: bool
+    ports: dict[int, UavPorts]
+    peer_of: dict[int, int]
+    """The first UAV of the autopilot process in which each UAV flies."""
+    station: int
+    """Port of the ground station."""
+    folder: Path
+    """The run's folder."""
+
+
+class Waiter:
+    """Waits for any of several sockets and pipes."""
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+
+    def add(self, source: Any) -> None:
+        """Wake up when ``source`` (with ``fileno``) can be read."""
+        self._selector.register(source, selectors.EVENT_READ)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait at most ``seconds``; whether something can be read."""
+        return bool(self._selector.select(max(0.0, seconds)))
+
+    def close(self) -> None:
+        self._selector.close()
+
+
+class Telemetry:
+    """When to send telemetry and heartbeats: at 10 Hz simulated or wall, whichever is slower."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._every = max(1, round(_TELEMETRY / timing.period))
+        self._last = -1e9
+        self._last_heartbeat = -1e9
+
+    def due(self, tick: int) -> bool:
+        """Whether telemetry is due at this tick."""
+        if tick % self._every:
+            return False
+        now = time.monotonic()
+        # A tenth of slack: a tick that comes a little early must not halve the rate.
+        if now - self._last < 0.9 * _TELEMETRY:
+            return False
+        self._last = now
+        return True
+
+    def heartbeat_due(self) -> bool:
+        """Whether a heartbeat is due."""
+        now = time.monotonic()
+        if now - self._last_heartbeat < _HEARTBEAT:
+            return False
+        self._last_heartbeat = now
+        return True
+
+
+class Stall:
+    """Notices that a process makes no progress."""
+
+    def __init__(self) -> None:
+        self._since = time.monotonic()
+        self._said = False
+
+    def progress(self) -> None:
+        """There is progress."""
+        self._since = time.monotonic()
+        self._said = False
+
+    @property
+    def long(self) -> bool:
+        """True once, when there has been none for 10 s."""
+        if self._said or time.monotonic() - self._since < _STALL:
+            return False
+        self._said = True
+        return True
+
+
+@contextlib.contextmanager
+def _log(path: Path) -> Iterator[None]:
+    """Send standard output and error, also of C code and of a crash, to the process's log."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", buffering=1) as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+        faulthandler.enable(file)
+        yield
+        sys.stdout.flush()
+        sys.stderr.flush()
+        faulthandler.disable()
+
+
+def process_main(name: str, pipe: Connection, setting: Setting, run: Callable[..., None], specs: Any) -> None:
+    """Body of every child process: ``run(specs, setting, gate)`` under a log; exit code 1 if it raises.
+
+    Ctrl-C is the launcher's business: it reaches the children as a message.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    code = 0
+    with _log(setting.folder / "logs" / f"{name}.log"):
+        try:
+            run(specs, setting, Gate(pipe))
+        except LauncherGoneError:
+            print("the launcher is gone: ending", flush=True)
+            code = 3
+        except Exception:
+            traceback.print_exc()
+            code = 1
+    # Skip the interpreter's clean-up: files are closed, and foreign threads must not keep a process alive.
+    os._exit(code)

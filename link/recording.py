@@ -1,0 +1,177 @@
+"""What each process writes while it flies: its part of the recording and the log of events.
+
+A part is an Arrow IPC stream: readable to its last batch after ``kill -9``, which a Parquet file is not.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "Column",
+    "EventLog",
+    "PartWriter",
+    "arrow_schema",
+    "part_path",
+    "read_events",
+    "read_part",
+]
+
+SCHEMA_VERSION = 1
+"""Of parts, merged tables and event logs."""
+
+_ROWS = 500
+"""Rows in a record batch: 5 s at 100 Hz is what a killed process loses at most."""
+
+_INTEGERS = ("uav",)
+
+
+class Column(NamedTuple):
+    """A column of a recording."""
+
+    name: str
+    unit: str
+    meaning: str = ""
+
+
+def part_path(folder: Path, uav: int, role: str) -> Path:
+    """Where the process that plays ``role`` ("vehicle" or "autopilot") for a UAV writes."""
+    return Path(folder) / "parts" / f"{uav}-{role}.arrows"
+
+
+def arrow_schema(columns: Iterable[Column], metadata: Mapping[str, str] | None = None) -> Any:
+    """Arrow schema with unit and meaning of each column and the schema version: ``uav`` int32, all else float64."""
+    import pyarrow as pa
+
+    fields = [
+        pa.field(
+            column.name,
+            pa.int32() if column.name in _INTEGERS else pa.float64(),
+            nullable=False,
+            metadata={"unit": column.unit, "meaning": column.meaning},
+        )
+        for column in columns
+    ]
+    return pa.schema(fields, metadata={"ftcc.schema": str(SCHEMA_VERSION), **(metadata or {})})
+
+
+class PartWriter:
+    """Appends rows to an Arrow IPC stream, a batch at a time.
+
+    Parameters
+    ----------
+    path : Path
+        File to write; its folder is created.
+    columns : sequence of Column
+    """
+
+    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+        import pyarrow as pa  # never before the fork
+
+        self._pa = pa
+        self.path = Path(path)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self.columns = tuple(columns)
+        self._schema = arrow_schema(self.columns)
+        self._integer = [column.name in _INTEGERS for column in self.columns]
+        self._buffer = np.empty((_ROWS, len(self.columns)))
+        self._filled = 0
+        self._flushed = time.monotonic()
+        self._file = open(self.path, "wb", buffering=0)
+        self._stream = pa.ipc.new_stream(self._file, self._schema)
+
+    def row(self, values: Sequence[float]) -> None:
+        """Append a row, in the order of the columns."""
+        self._buffer[self._filled] = values
+        self._filled += 1
+        if self._filled == _ROWS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has been gathered as one batch."""
+        self._flushed = time.monotonic()
+        if self._filled == 0:
+            return
+        rows = self._buffer[: self._filled]
+        arrays = [
+            self._pa.array(rows[:, n].astype(np.int32) if integer else np.ascontiguousarray(rows[:, n]))
+            for n, integer in enumerate(self._integer)
+        ]
+        self._stream.write_batch(self._pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+        self._filled = 0
+
+    def flush_if_due(self) -> None:
+        """Flush what is older than a second of wall time."""
+        if time.monotonic() - self._flushed > 1.0:
+            self.flush()
+
+    def close(self) -> None:
+        """Flush and end the stream; may be called twice."""
+        if self._file.closed:
+            return
+        self.flush()
+        self._stream.close()
+        self._file.close()
+
+
+def read_part(path: Path) -> Any:
+    """The part as a ``pyarrow.Table``, up to the last batch that was written completely; None if there is not even a schema."""
+    import pyarrow as pa
+
+    batches = []
+    with open(path, "rb") as file:
+        try:
+            stream = pa.ipc.open_stream(file)
+        except (pa.ArrowInvalid, OSError, EOFError):
+            return None
+        whole = True
+        while whole:
+            try:
+                batches.append(stream.read_next_batch())
+            except (StopIteration, pa.ArrowInvalid, OSError, EOFError):
+                # The end, or the batch in whose middle the writer was killed.
+                whole = False
+        return pa.Table.from_batches(batches, schema=stream.schema)
+
+
+class EventLog:
+    """Appends events to a file, a JSON object a line, each written through at once."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        new = not self.path.exists()
+        self._file = open(self.path, "a", encoding="utf-8", buffering=1)
+        if new:
+            self._file.write(json.dumps({"schema": SCHEMA_VERSION}) + "\n")
+
+    def write(self, t: float, text: str, uav: int | None = None, severity: str = "info", **more: Any) -> None:
+        """Append an event at simulated time ``t`` (s); ``severity`` is "info", "warning" or "error"."""
+        event = {"t": t, "uav": uav, "severity": severity, "text": text, "wall": round(time.time(), 3), **more}
+        self._file.write(json.dumps(event) + "\n")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def read_events(path: Path) -> list[dict[str, Any]]:
+    """The events of a log in order of simulated time; a last line that was not written completely is left out."""
+    events = []
+    if not Path(path).exists():
+        return []
+    for line in Path(path).read_text(encoding="utf-8").splitlines():
+        try:
+            event = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if "t" in event:
+            events.append(event)
+    return sorted(events, key=lambda event: float(event["t"]))

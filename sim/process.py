@@ -1,0 +1,273 @@
+"""The vehicle process: flies one or several vehicles and speaks MAVLink with their autopilots.
+
+At tick k a vehicle latches the command that answers state k-1, sends state k with the command in force, and flies on to
+k+1. In real time it paces itself on the wall clock and holds the last command where a new one is late; in lockstep it
+waits for it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from ftcc.link.actuators import ACTUATORS, decode_command
+from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
+from ftcc.link.mavlink import (
+    LOOPBACK,
+    SIMULATOR,
+    Endpoint,
+    dialect,
+    float_array,
+    read_command,
+    read_target,
+    state_messages,
+)
+from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
+from ftcc.link.recording import Column, PartWriter
+from ftcc.sim.cycle import fly_period, report_state
+from ftcc.sim.plant import LOST, TRUTH, UNITS, Fleet, effects
+from ftcc.sim.spec import VehicleSpec, build
+
+__all__ = ["COLUMNS", "TRUTH_ARRAY", "Vehicles", "load_compiled", "run"]
+
+_ACTUATOR_UNITS = {"thrust": "N"}
+
+COLUMNS = (
+    Column("t", "s", "simulated time"),
+    Column("uav", "-", "id"),
+    *(Column(name, UNITS[name], "altitude, up" if name == "z" else "") for name in TRUTH),
+    *(Column(f"{name}_command", _ACTUATOR_UNITS.get(name, "rad"), "command in force") for name in ACTUATORS),
+    *(Column(name, _ACTUATOR_UNITS.get(name, "rad"), "what acts on the airframe") for name in ACTUATORS),
+)
+"""Columns of a vehicle's part of the recording."""
+
+TRUTH_ARRAY = (
+    *TRUTH,
+    *(f"{name}_command" for name in ACTUATORS),
+    *ACTUATORS,
+    *(f"{name}_effectiveness" for name in ACTUATORS),
+    *(f"{name}_bias" for name in ACTUATORS),
+    "late",
+)
+"""Contents of the DEBUG_FLOAT_ARRAY "truth" that a vehicle sends to the station, and to nobody else."""
+
+
+def run(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
+    """Fly the vehicles of this process from the launcher's go to its release."""
+    vehicles = Vehicles(specs, setting, gate)
+    try:
+        gate.tell(Ready())
+        gate.wait_until_go()
+        vehicles.fly()
+    finally:
+        vehicles.close()
+
+
+def load_compiled(fleet: Fleet) -> None:
+    """Load, or compile, the functions of a tick before the flight."""
+    k = len(fleet.uav)
+    nobody, true, seen = np.zeros(k, np.int64), np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH))
+    report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
+    fly_period(fleet, nobody, 0, 1, 1, nobody)
+    decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
+    effects(fleet, 0, 0.0)
+
+
+class Vehicles:
+    """The vehicles of a process."""
+
+    def __init__(self, specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
+        self.specs = specs
+        self.setting = setting
+        self.timing = setting.timing
+        self.gate = gate
+        self.fleet = build(specs)
+        k = len(specs)
+        self.alive = np.ones(k, np.int64)
+        self.true = np.zeros((k, len(TRUTH)))
+        self.seen = np.zeros(len(TRUTH))
+        self.messages = np.zeros((k, 13))
+        self.controls = np.zeros((k, 4))
+        self.why = np.zeros(k, np.int64)
+        self.answered = np.full(k, -1, np.int64)
+        self.received = np.zeros((k, 4))
+        self.targets = np.zeros((k, 7))
+        self.late = np.zeros(k, np.int64)
+        self.tick = 0
+        ports = [setting.ports[spec.uav] for spec in specs]
+        self.pilots = [
+            Endpoint(spec.uav, SIMULATOR, port.vehicle, (LOOPBACK, port.autopilot))
+            for spec, port in zip(specs, ports, strict=True)
+        ]
+        self.station = [Endpoint(spec.uav, SIMULATOR, 0, (LOOPBACK, setting.station)) for spec in specs]
+        self.parts = [PartWriter(setting.folder / "parts" / f"{s.uav}-vehicle.arrows", COLUMNS) for s in specs]
+        self.telemetry = Telemetry(self.timing)
+        self.stall = Stall()
+        self.waiter = Waiter()
+        for source in (gate, *self.pilots):
+            self.waiter.add(source)
+        load_compiled(self.fleet)
+
+    def fly(self) -> None:
+        """All ticks, or until everything is lost or the launcher stops the flight."""
+        for self.tick in range(self.timing.ticks + 1):
+            if not self.wait() or not self.alive.any():
+                break
+            self.latch()
+            self.send_state()
+            self.record()
+            self.advance()
+            self.report()
+        else:
+            # A state that got lost must still be sent again until it is answered.
+            self.tick = self.timing.ticks + 1
+            if self.setting.lockstep:
+                self.wait()
+        for part in self.parts:
+            part.close()
+        self.gate.tell(Ended(self.tick, int(self.late.sum()), self.tick * len(self.specs)))
+        self.gate.wait_until_released(60.0)
+
+    @property
+    def now_us(self) -> int:
+        """Simulated time of the present tick."""
+        return self.tick * self.timing.period_us
+
+    def wait(self) -> bool:
+        """Wait until the present tick may begin; False if the flight is to end."""
+        self.stall.progress()
+        sent = time.monotonic()
+        while True:
+            self.gate.read()
+            self.listen()
+            if self.gate.stopping:
+                return False
+            if not self.gate.open(self.tick):
+                self.stall.progress()
+                self.waiter.wait(1.0)
+            elif not self.setting.lockstep:
+                rest = self.gate.due(self.tick, self.timing.period) - time.monotonic()
+                if rest <= 0.0:
+                    return True
+                self.waiter.wait(rest)
+            else:
+                missing = self.missing()
+                if not missing:
+                    return True
+                if not self.waiter.wait(RESEND) or time.monotonic() - sent > RESEND:
+                    sent = time.monotonic()
+                    for i in missing:
+                        self.pilots[i].send_again()
+                if self.stall.long:
+                    names = ", ".join(str(self.specs[i].uav) for i in missing)
+                    self.gate.tell(Said("warning", f"vehicles wait for commands of UAV {names} at tick {self.tick}"))
+
+    def missing(self) -> list[int]:
+        """Who has not answered the last state."""
+        if self.tick == 0:
+            return []
+        wanted = self.now_us - self.timing.period_us
+        return [i for i in range(len(self.specs)) if self.alive[i] and self.answered[i] < wanted]
+
+    def listen(self) -> None:
+        """Take in what the autopilots sent; the newest command counts."""
+        for i, pilot in enumerate(self.pilots):
+            for message in pilot.receive():
+                kind = message.get_type()
+                if kind == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
+                    self.lose(i, 5, self.now_us - self.timing.period_us)
+                    continue
+                if self.specs[i].kind == "reference_point":
+                    stamp = read_target(message, self.targets[i])
+                else:
+                    stamp = read_command(message, self.received[i])
+                if not self.alive[i]:
+                    pilot.send_again()
+                elif stamp >= 0:
+                    self.answered[i] = max(self.answered[i], stamp)
+
+    def latch(self) -> None:
+        """Bring the newest commands into force; one that does not answer the last state is late."""
+        if self.tick == 0:
+            return
+        wanted = self.now_us - self.timing.period_us
+        for i, spec in enumerate(self.specs):
+            if self.alive[i]:
+                self.late[i] += int(self.answered[i] < wanted)
+                if self.answered[i] < 0:
+                    continue
+                if spec.kind == "reference_point":
+                    self.fleet.target[i] = self.targets[i]
+                else:
+                    decode_command(self.received[i], self.fleet.travel[i], self.fleet.command[i])
+
+    def send_state(self) -> None:
+        """Measure and tell the autopilots."""
+        report_state(
+            self.fleet,
+            self.alive,
+            self.tick,
+            self.now_us,
+            self.timing.seed,
+            self.true,
+            self.seen,
+            self.messages,
+            self.controls,
+        )
+        for i, pilot in enumerate(self.pilots):
+            if self.alive[i]:
+                pilot.send(*state_messages(self.now_us, self.messages[i], self.controls[i]))
+
+    def record(self) -> None:
+        """Append a row of truth to each part."""
+        if self.tick % self.timing.record_every == 0:
+            for i, spec in enumerate(self.specs):
+                if self.alive[i]:
+                    self.parts[i].row(
+                        (self.now_us / 1e6, spec.uav, *self.true[i], *self.fleet.command[i], *self.fleet.acting[i])
+                    )
+
+    def advance(self) -> None:
+        """Fly one period; a vehicle that leaves its model is lost."""
+        fly_period(self.fleet, self.alive, self.now_us, self.timing.period_us, self.timing.step_us, self.why)
+        for i in range(len(self.specs)):
+            if self.alive[i] and self.why[i]:
+                self.lose(i, int(self.why[i]), self.now_us + self.timing.period_us)
+
+    def lose(self, i: int, why: int, at_us: int) -> None:
+        """Declare a vehicle lost, to its autopilot and to the launcher."""
+        if not self.alive[i]:
+            return
+        self.alive[i] = 0
+        self.parts[i].flush()
+        self.pilots[i].send(
+            dialect.MAVLink_heartbeat_message(
+                dialect.MAV_TYPE_FIXED_WING,
+                dialect.MAV_AUTOPILOT_INVALID,
+                0,
+                0,
+                dialect.MAV_STATE_FLIGHT_TERMINATION,
+                3,
+            )
+        )
+        self.gate.tell(Lost(self.specs[i].uav, at_us, LOST[why]))
+
+    def report(self) -> None:
+        """Truth to the station."""
+        if not self.telemetry.due(self.tick):
+            return
+        for i in range(len(self.specs)):
+            if self.alive[i]:
+                values = [*self.true[i], *self.fleet.command[i], *self.fleet.acting[i]]
+                values += effects(self.fleet, i, self.now_us / 1e6)
+                self.station[i].send(float_array(self.now_us, "truth", [*values, float(self.late[i])]))
+        for part in self.parts:
+            part.flush_if_due()
+
+    def close(self) -> None:
+        """Free the ports."""
+        for endpoint in (*self.pilots, *self.station):
+            endpoint.close()
+        self.waiter.close()

@@ -1,0 +1,67 @@
+"""Level trim of the longitudinal airframe."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.sim.airframe import Airframe, longitudinal_rates
+
+__all__ = ["Trim", "TrimError", "trim"]
+
+_SCALE = np.array([0.03, -0.2, 20.0])
+"""Typical angle of attack, elevator and thrust: the unknowns are solved for as multiples of these."""
+
+_LARGEST_ALPHA = 0.8
+"""Beyond this the polynomial airframe has solutions that no aircraft has, rad."""
+
+
+class TrimError(ValueError):
+    """The airframe has no level trim there."""
+
+
+class Trim(NamedTuple):
+    """Level flight at constant speed."""
+
+    alpha: float
+    """Angle of attack, which is the pitch angle in level flight, rad."""
+    elevator: float
+    """rad."""
+    thrust: float
+    """N."""
+
+
+def trim(airframe: Airframe, V: float, d1: float = 0.0, d2: float = 0.0, d3: float = 0.0) -> Trim:
+    """Trim at airspeed ``V`` (m/s), gamma = q = 0, under constant disturbances.
+
+    Solves (2.8), (2.10) and (2.12) with all rates zero for angle of attack, elevator and thrust.
+
+    Parameters
+    ----------
+    airframe : Airframe
+    V : float
+        Airspeed, m/s.
+    d1, d2, d3 : float
+        Disturbances of airspeed (m/s^2), flight-path angle (rad/s) and pitch rate (rad/s^2).
+
+    Raises
+    ------
+    TrimError
+        If there is none.
+    """
+    from scipy.optimize import root  # takes longer to import than everything else here
+
+    def rates(unknown: NDArray[np.float64]) -> list[float]:
+        alpha, elevator, thrust = (float(value) for value in unknown * _SCALE)
+        V_dot, _, _, gamma_dot, _, q_dot = longitudinal_rates(
+            float(V), 0.0, alpha, 0.0, thrust, elevator, float(d1), float(d2), float(d3), airframe
+        )
+        return [V_dot, gamma_dot, q_dot]
+
+    found = root(rates, np.ones(3), tol=1e-12)
+    solution = Trim(*(float(value) for value in found.x * _SCALE))
+    if max(abs(rate) for rate in rates(found.x)) > 1e-9 or abs(solution.alpha) > _LARGEST_ALPHA:
+        raise TrimError(f"the airframe has no level trim at {V:g} m/s with disturbances {d1:g}, {d2:g}, {d3:g}")
+    return solution
