@@ -8,6 +8,7 @@ tick and never runs ahead of those who hear it.
 from __future__ import annotations
 
 import collections
+import functools
 from collections.abc import Sequence
 from types import ModuleType
 
@@ -69,6 +70,11 @@ def load_compiled(autopilots: Autopilots, inbox: Inbox, events: LinkEvents, law:
     admit(inbox, 0, 0, -1, 0, True, autopilots.shared[0], 0, 0, 0)
 
 
+def _those(mask: np.ndarray) -> list[int]:
+    """Indices where ``mask`` is set."""
+    return np.flatnonzero(mask).tolist()  # type: ignore[no-any-return]
+
+
 class _Link:
     """An in-edge as its receiver manages it: raw records that are not due yet, and what is known of the sender."""
 
@@ -121,8 +127,11 @@ class Crew:
         self.telemetry = [Telemetry(self.timing) for _ in specs]
         self.stall = Stall()
         self.waiter = Waiter()
-        for source in (gate, *self.vehicles, *([self.mesh] if self.mesh else [])):
-            self.waiter.add(source)
+        self.waiter.add(gate, gate.read)
+        for i, vehicle in enumerate(self.vehicles):
+            self.waiter.add(vehicle, functools.partial(self.listen, i))
+        if self.mesh:
+            self.waiter.add(self.mesh, self.take_records)
         load_compiled(self.autopilots, self.inbox, self.events, self.law)
 
     def _open_mesh(self) -> Mesh | None:
@@ -149,11 +158,9 @@ class Crew:
         """Wait until all who hear this process's UAVs have subscribed."""
         self.stall.progress()
         while self.mesh and not self.mesh.ready:
-            self.gate.read()
             if self.gate.stopping:
                 return
             self.waiter.wait(0.2)
-            self.take_records()
             if self.stall.long:
                 self.gate.tell(Said("warning", f"mesh: still waiting for {', '.join(self.mesh.awaited)}"))
 
@@ -186,8 +193,6 @@ class Crew:
         one = np.zeros_like(self.alive)
         while self.alive.any() and not self.gate.stopping:
             self.waiter.wait(0.2)
-            self.gate.read()
-            self.listen()
             self.take_records()
             for i in range(len(self.specs)):
                 while self.alive[i] and self.states[i]:
@@ -222,7 +227,7 @@ class Crew:
         events = self.events
         if events.position[0] < len(events.at_us) and events.at_us[events.position[0]] <= now:
             set_links(events, self.inbox, now)
-        for i in np.flatnonzero(active):
+        for i in _those(active):
             for sender, link in self.links[i].items():
                 while link.pending and link.pending[0].stamp_us + self.timing.latency_us <= now:
                     record = link.pending.popleft()
@@ -253,14 +258,14 @@ class Crew:
             self.now_us(tick),
             self.timing.period_us,
         )
-        for i in np.flatnonzero(active):
+        for i in _those(active):
             self.done[i] = tick
             if not self.ok[i]:
                 self.give_up(i)
 
     def actuate(self, tick: int, active: np.ndarray) -> None:
         """Commands to the vehicles."""
-        for i in np.flatnonzero(active):
+        for i in _those(active):
             if not self.alive[i]:
                 continue
             if self.specs[i].role == "leader":
@@ -271,7 +276,7 @@ class Crew:
     def tell(self, tick: int, active: np.ndarray) -> None:
         """A record for the neighbours: here those in this process, by the mesh the others."""
         heard = self.heard()
-        for i in np.flatnonzero(active):
+        for i in _those(active):
             if self.alive[i]:
                 record = Record(
                     self.specs[i].uav,
@@ -286,7 +291,7 @@ class Crew:
     def report(self, tick: int, active: np.ndarray) -> None:
         """A row of the recording, and telemetry to the ground."""
         now = self.now_us(tick)
-        for i in np.flatnonzero(active):
+        for i in _those(active):
             if not self.alive[i]:
                 continue
             if i in self.parts and tick % self.timing.record_every == 0:
@@ -337,42 +342,35 @@ class Crew:
             if record.uav in self.acknowledged:
                 self.acknowledged[record.uav] = _NOTHING_MORE if record.last else record.heard
 
-    def listen(self) -> None:
-        """Take in what the vehicles sent; a state that was answered already is answered once more."""
-        for i, vehicle in enumerate(self.vehicles):
-            messages = vehicle.receive()
-            while messages:
-                if messages[0].get_type() == "HEARTBEAT":
-                    if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
-                        self.end(i)
-                    messages = messages[1:]
-                    continue
-                state, controls = np.zeros(13), np.zeros(4)
-                stamp = read_state(messages[:3], state, controls)
-                messages = messages[3:]
-                newest = self.states[i][-1][0] if self.states[i] else int(self.done[i])
-                tick = stamp // self.timing.period_us
-                if stamp < 0:
-                    continue
-                if tick > newest:
-                    self.states[i].append((tick, state, controls))
-                elif tick == self.done[i]:
-                    vehicle.send_again()
+    def listen(self, i: int) -> None:
+        """Take in what vehicle ``i`` sent; a state that was answered already is answered once more."""
+        messages = self.vehicles[i].receive()
+        while messages:
+            if messages[0].get_type() == "HEARTBEAT":
+                if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
+                    self.end(i)
+                messages = messages[1:]
+                continue
+            state, controls = np.zeros(13), np.zeros(4)
+            tick = read_state(messages[:3], state, controls) // self.timing.period_us
+            messages = messages[3:]
+            newest = self.states[i][-1][0] if self.states[i] else int(self.done[i])
+            if tick > newest:
+                self.states[i].append((tick, state, controls))
+            elif tick == self.done[i] >= 0:
+                self.vehicles[i].send_again()
 
     def wait(self, tick: int) -> bool:
         """Lockstep: wait until everything that tick needs is here; False if the flight is to end."""
         self.stall.progress()
         while True:
-            self.gate.read()
-            self.listen()
-            self.take_records()
             if self.gate.stopping:
                 return False
             missing = self.missing(tick)
             if not missing:
                 return True
             if not self.waiter.wait(RESEND):
-                for i in np.flatnonzero(self.alive):
+                for i in _those(self.alive):
                     if not self.states[i]:
                         self.vehicles[i].send_again()
                 if not self.gate.open(tick):
@@ -388,7 +386,7 @@ class Crew:
         """What a tick still needs, as text; empty if nothing."""
         due = self.now_us(tick) - self.timing.latency_us
         needed = due // self.timing.exchange_us if due >= 0 else -1
-        for i in np.flatnonzero(self.alive):
+        for i in _those(self.alive):
             if not self.states[i]:
                 return f"the state of UAV {self.specs[i].uav}"
             for sender, link in self.links[i].items():
@@ -408,7 +406,7 @@ class Crew:
         """Sequence number up to which everything has been received from all outside this process."""
         newest = [
             link.newest
-            for i in np.flatnonzero(self.alive)
+            for i in _those(self.alive)
             for sender, link in self.links[i].items()
             if sender not in self.index and not link.ended and sender not in self.gate.gone
         ]
@@ -437,8 +435,10 @@ class Crew:
 
     def close(self) -> None:
         """Free the ports; leave the mesh."""
-        for endpoint in (*self.vehicles, *self.reporters):
-            endpoint.close()
+        for vehicle in self.vehicles:
+            vehicle.close()
+        for reporter in self.reporters:
+            reporter.close()
         if self.mesh:
             self.mesh.close()
         self.waiter.close()

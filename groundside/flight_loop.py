@@ -14,10 +14,10 @@ from ftcc.airside.autopilots import lead, sense, set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
 from ftcc.link.compiled import compiled, copy, fill
-from ftcc.sim.plant import actuate, advance, truth
+from ftcc.sim.plant import DIVERGED, actuate, advance, truth
 from ftcc.sim.sensors import encode_state, measure
 
-__all__ = ["DIVERGED", "HISTORY", "Ether", "Recording", "fly"]
+__all__ = ["HISTORY", "Ether", "Recording", "fly"]
 
 if "tick" not in globals():
     raise ImportError("ftcc.groundside.flight_loop is a template: use ftcc.groundside.simulate")
@@ -29,9 +29,6 @@ _control = tick.control
 
 HISTORY = 64
 """Records kept of each sender."""
-
-DIVERGED = 5
-"""Key of ``sim.plant.LOST``: the law's command is not finite."""
 
 
 class Ether(NamedTuple):

@@ -94,7 +94,7 @@ class Graph:
         self.require(Assumption.LEADERS_REACH_ALL)
         n = len(self.followers)
         laplacian = self.laplacian
-        return -np.linalg.solve(laplacian[:n, :n], laplacian[:n, n:])
+        return np.asarray(-np.linalg.solve(laplacian[:n, :n], laplacian[:n, n:]), np.float64)
 
     def reached_from(self, sources: tuple[int, ...]) -> set[int]:
         """Ids that records from ``sources`` can reach along the edges, sources included."""

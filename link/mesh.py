@@ -60,7 +60,7 @@ class Mesh:
         hears = list(hears)
         own = list(own)
         for uav in hears:
-            handler = self._deliver if ordered else zenoh.handlers.RingChannel(_RING)
+            handler: Any = self._deliver if ordered else zenoh.handlers.RingChannel(_RING)
             self._subscribers.append(
                 self._session.declare_subscriber(
                     f"{self._prefix}/{uav}/shared", handler, allowed_origin=zenoh.Locality.REMOTE

@@ -49,18 +49,21 @@ class Setting:
 
 
 class Waiter:
-    """Waits for any of several sockets and pipes."""
+    """Waits for any of several sockets and pipes, and has what arrives handled."""
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
 
-    def add(self, source: Any) -> None:
-        """Wake up when ``source`` (with ``fileno``) can be read."""
-        self._selector.register(source, selectors.EVENT_READ)
+    def add(self, source: Any, handle: Callable[[], None]) -> None:
+        """Call ``handle`` when ``source`` (with ``fileno``) can be read."""
+        self._selector.register(source, selectors.EVENT_READ, handle)
 
     def wait(self, seconds: float) -> bool:
-        """Wait at most ``seconds``; whether something can be read."""
-        return bool(self._selector.select(max(0.0, seconds)))
+        """Wait at most ``seconds`` and handle what can be read; False if nothing came."""
+        ready = self._selector.select(max(0.0, seconds))
+        for key, _ in ready:
+            key.data()
+        return bool(ready)
 
     def close(self) -> None:
         self._selector.close()

@@ -17,6 +17,7 @@ from ftcc.link.compiled import compiled, fields
 from ftcc.sim.airframe import Airframe, longitudinal_rates
 
 __all__ = [
+    "DIVERGED",
     "LOST",
     "TRUTH",
     "UNITS",
@@ -36,13 +37,16 @@ UNITS = dict(zip(TRUTH, ("m", "m", "m", "m/s") + ("rad",) * 6 + ("rad/s",) * 3, 
 
 X, Y, Z, V, GAMMA, CHI, MU, ALPHA, BETA, THETA, P, Q, R = range(13)
 
+DIVERGED = 5
+"""Key of `LOST`: the law's command is not finite."""
+
 LOST = {
     0: "",
     1: "airspeed left the model",
     2: "flight-path angle left the model",
     3: "angle of attack left the model",
     4: "state is not a number",
-    5: "control law gave a command that is not a number",
+    DIVERGED: "control law gave a command that is not a number",
 }
 """Why a vehicle ended, by code."""
 

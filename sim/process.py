@@ -7,6 +7,7 @@ waits for it.
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Sequence
 
@@ -27,7 +28,7 @@ from ftcc.link.mavlink import (
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
 from ftcc.sim.cycle import fly_period, report_state
-from ftcc.sim.plant import LOST, TRUTH, UNITS, Fleet, effects
+from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, effects
 from ftcc.sim.spec import VehicleSpec, build
 
 __all__ = ["COLUMNS", "TRUTH_ARRAY", "Vehicles", "load_compiled", "run"]
@@ -106,13 +107,15 @@ class Vehicles:
         self.telemetry = Telemetry(self.timing)
         self.stall = Stall()
         self.waiter = Waiter()
-        for source in (gate, *self.pilots):
-            self.waiter.add(source)
+        self.waiter.add(gate, gate.read)
+        for i, pilot in enumerate(self.pilots):
+            self.waiter.add(pilot, functools.partial(self.listen, i))
         load_compiled(self.fleet)
 
     def fly(self) -> None:
         """All ticks, or until everything is lost or the launcher stops the flight."""
-        for self.tick in range(self.timing.ticks + 1):
+        for tick in range(self.timing.ticks + 1):
+            self.tick = tick
             if not self.wait() or not self.alive.any():
                 break
             self.latch()
@@ -140,8 +143,6 @@ class Vehicles:
         self.stall.progress()
         sent = time.monotonic()
         while True:
-            self.gate.read()
-            self.listen()
             if self.gate.stopping:
                 return False
             if not self.gate.open(self.tick):
@@ -150,6 +151,7 @@ class Vehicles:
             elif not self.setting.lockstep:
                 rest = self.gate.due(self.tick, self.timing.period) - time.monotonic()
                 if rest <= 0.0:
+                    self.waiter.wait(0.0)
                     return True
                 self.waiter.wait(rest)
             else:
@@ -171,22 +173,22 @@ class Vehicles:
         wanted = self.now_us - self.timing.period_us
         return [i for i in range(len(self.specs)) if self.alive[i] and self.answered[i] < wanted]
 
-    def listen(self) -> None:
-        """Take in what the autopilots sent; the newest command counts."""
-        for i, pilot in enumerate(self.pilots):
-            for message in pilot.receive():
-                kind = message.get_type()
-                if kind == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
-                    self.lose(i, 5, self.now_us - self.timing.period_us)
-                    continue
-                if self.specs[i].kind == "reference_point":
-                    stamp = read_target(message, self.targets[i])
-                else:
-                    stamp = read_command(message, self.received[i])
-                if not self.alive[i]:
-                    pilot.send_again()
-                elif stamp >= 0:
-                    self.answered[i] = max(self.answered[i], stamp)
+    def listen(self, i: int) -> None:
+        """Take in what the autopilot of vehicle ``i`` sent; the newest command counts."""
+        pilot = self.pilots[i]
+        for message in pilot.receive():
+            kind = message.get_type()
+            if kind == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
+                self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
+                continue
+            if self.specs[i].kind == "reference_point":
+                stamp = read_target(message, self.targets[i])
+            else:
+                stamp = read_command(message, self.received[i])
+            if not self.alive[i]:
+                pilot.send_again()
+            elif stamp >= 0:
+                self.answered[i] = max(self.answered[i], stamp)
 
     def latch(self) -> None:
         """Bring the newest commands into force; one that does not answer the last state is late."""

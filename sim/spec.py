@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
 from ftcc.sim.airframe import Airframe
@@ -46,7 +47,7 @@ class VehicleSpec:
         return tuple(max(abs(low), abs(high)) for low, high in self.limits)
 
 
-def _padded(rows: Sequence[Sequence[tuple[float, ...]]], width: int) -> np.ndarray:
+def _padded(rows: Sequence[Sequence[tuple[float, ...]]], width: int) -> NDArray[np.float64]:
     table = np.zeros((len(rows), max([1] + [len(row) for row in rows]), width))
     table[:, :, 0] = math.inf
     for i, row in enumerate(rows):
@@ -63,12 +64,13 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         V, x, z, gamma = spec.initial[:4]
         target[i] = (0.0, x, spec.offset, z, V * math.cos(gamma), 0.0, V * math.sin(gamma))
     command = np.array([spec.command for spec in specs], np.float64)
+    limits = np.array([spec.limits for spec in specs], np.float64)
     return Fleet(
         state=np.array([spec.initial for spec in specs], np.float64),
-        position=np.array([np.clip(s.command, *zip(*s.limits, strict=True)) for s in specs], np.float64),
+        position=np.clip(command, limits[:, :, 0], limits[:, :, 1]),
         command=command,
         acting=np.zeros((k, len(ACTUATORS))),
-        limits=np.array([spec.limits for spec in specs], np.float64),
+        limits=limits,
         lag=np.array([spec.lag for spec in specs], np.float64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
         faults=_padded([spec.faults for spec in specs], len(Fault._fields)),

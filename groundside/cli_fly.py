@@ -1,0 +1,237 @@
+"""The commands that deal with running swarms: fly, ps, stop, resume, doctor."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from ftcc.groundside.cli_common import (
+    Duration,
+    Form,
+    Out,
+    Seed,
+    Settings,
+    Variants,
+    fail,
+    load_mission,
+    new_run_folder,
+    show_claims,
+)
+
+__all__ = ["register"]
+
+console = Console()
+_BAD_INPUT = 2
+_FLIGHT_FAILED = 1
+
+_COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to ``app``."""
+    for command in (fly, ps, stop, resume, doctor):
+        app.command()(command)
+
+
+def _speed(text: str) -> float | None:
+    """A factor, or None for "max" (lockstep)."""
+    if text == "max":
+        return None
+    try:
+        factor = float(text)
+    except ValueError:
+        fail(f"--speed {text}: must be a positive factor or 'max'")
+    if not 0.0 < factor < 1000.0:
+        fail(f"--speed {text}: must be a positive factor below 1000, or 'max'")
+    return factor
+
+
+def _pack(text: str, uavs: int) -> int:
+    from ftcc.groundside.launcher import automatic_pack
+
+    if text == "auto":
+        return automatic_pack(uavs)
+    if not text.isdigit() or not 1 <= int(text) <= uavs:
+        fail(f"--pack {text}: must be 'auto' or a number of vehicles per process from 1 to {uavs}")
+    return int(text)
+
+
+def fly(
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario or the path of a TOML file.")] = "demo",
+    form: Form = None,
+    variant: Variants = "",
+    duration: Duration = None,
+    seed: Seed = None,
+    out: Out = None,
+    settings: Settings = None,
+    speed: Annotated[str, typer.Option(help="Simulated seconds per second, or 'max': lockstep.")] = "1",
+    hold: Annotated[bool, typer.Option("--hold", help="Stay at t = 0 until `ftcc resume`.")] = False,
+    viewer: Annotated[str, typer.Option(help="web, native or none.")] = "web",
+    browser: Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")] = True,
+    pack: Annotated[str, typer.Option(help="Vehicles per process, or 'auto'.")] = "1",
+    port: Annotated[int | None, typer.Option(help="First port of the swarm's block; default: a free one.")] = None,
+) -> None:
+    """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
+    factor = _speed(speed)
+    if viewer not in ("web", "native", "none"):
+        fail(f"--viewer {viewer}: must be web, native or none")
+    mission = load_mission(scenario, form, variant, settings, seed, duration)
+    if not mission.wire:
+        fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
+    count = _pack(pack, len(mission.vehicles))
+    folder = new_run_folder(mission, out)
+
+    from ftcc.groundside.fly import FlightOptions
+    from ftcc.groundside.fly import fly as fly_mission
+    from ftcc.groundside.snapshot import Event
+    from ftcc.link.ports import PortError, reserve
+
+    try:
+        ports = reserve([spec.uav for spec in mission.vehicles], port)
+    except PortError as error:
+        folder.rmdir()
+        fail(str(error))
+    options = FlightOptions(folder, factor is None, factor or 1.0, count, hold, viewer, browser)
+    bar = Progress(
+        TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"), console=console
+    )
+    begun = time.monotonic()
+
+    def say(event: Event) -> None:
+        who = f"UAV {event.uav}: " if event.uav else ""
+        colour = _COLOURS.get(event.severity, "white")
+        bar.console.print(f"[{colour}]{max(event.t, 0.0):8.2f} s[/]  {who}{escape(event.text)}", soft_wrap=True)
+
+    def started(address: str | None) -> None:
+        nonlocal begun
+        begun = time.monotonic()
+        bar.update(task, description=f"flying {mission.case}")
+        if address:
+            bar.console.print(f"dashboard: {address}", soft_wrap=True)
+        if hold:
+            bar.console.print("held at t = 0: `ftcc resume` lets it fly")
+
+    console.print(f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {folder}", soft_wrap=True)
+    with bar:
+        task = bar.add_task("starting", total=mission.timing.duration)
+        try:
+            outcome = fly_mission(mission, options, ports, say, lambda t: bar.update(task, completed=t), started)
+        except TimeoutError as error:
+            console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
+            raise typer.Exit(_FLIGHT_FAILED) from error
+    wall = time.monotonic() - begun
+    show_claims(folder)
+    share = 100.0 * outcome.late / max(outcome.ticks, 1)
+    flown = outcome.ticks * mission.timing.period / len(mission.vehicles)
+    console.print(
+        f"flew {flown:.1f} s in {wall:.1f} s ({flown / max(wall, 1e-9):.1f} times real time), "
+        f"{outcome.late} of {outcome.ticks} ticks late ({share:.2f} %)"
+    )
+    if not outcome.ok:
+        for name in outcome.died:
+            console.print(f"[bold red]process {name} died[/]; see {folder / 'logs'}", soft_wrap=True)
+        for uav, reason in outcome.lost.items():
+            console.print(f"[bold red]UAV {uav} lost[/]: {reason}")
+        raise typer.Exit(_FLIGHT_FAILED)
+
+
+def ps() -> None:
+    """List the running swarms."""
+    from ftcc.groundside.registry import running
+
+    entries = running()
+    if not entries:
+        console.print("no swarm is running")
+        return
+    table = Table("name", "scenario", "UAVs", "pid", "ports", "since", "dashboard", box=None)
+    for entry in entries:
+        table.add_row(
+            entry.name,
+            entry.scenario,
+            str(entry.uavs),
+            str(entry.pid),
+            f"{entry.ports[0]}-{entry.ports[1]}",
+            time.strftime("%H:%M:%S", time.localtime(entry.started)),
+            entry.viewer or "",
+        )
+    console.print(table)
+
+
+_Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
+
+
+def _tell(name: str | None, command: str) -> None:
+    from ftcc.groundside.registry import find, tell
+
+    try:
+        tell(find(name), command)
+    except LookupError as error:
+        fail(str(error))
+    except (OSError, RuntimeError) as error:
+        console.print(f"[bold red]{escape(str(error))}[/]")
+        raise typer.Exit(_FLIGHT_FAILED) from error
+
+
+def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all swarms.")] = False) -> None:
+    """End a running swarm in order; its run stays complete up to now."""
+    from ftcc.groundside.registry import running
+
+    names: list[str | None] = [entry.name for entry in running()] if every else [name]
+    for one in names:
+        _tell(one, "stop")
+
+
+def resume(name: _Name = None) -> None:
+    """Let a swarm that was started with --hold fly."""
+    _tell(name, "resume")
+
+
+_MS_PER_TICK = 0.55
+"""Processor time that one UAV (vehicle and autopilot process) costs per tick, ms; measured on a 2-core AMD EPYC."""
+
+
+def doctor(
+    scenario: Annotated[str, typer.Argument(help="Scenario whose load is predicted.")] = "demo",
+    variant: Variants = "",
+) -> None:
+    """Say whether this machine can fly a scenario, and what is missing for the browser tests."""
+    from ftcc.link.ports import PortError, reserve
+
+    mission = load_mission(scenario, None, variant, None, None, None)
+    cores = os.cpu_count() or 1
+    table = Table("what", "found", "verdict", box=None)
+    table.add_row("Python", sys.version.split()[0], "ok")
+    table.add_row("cores", str(cores), "ok" if cores >= 2 else "few")
+    load = len(mission.vehicles) * _MS_PER_TICK / (mission.timing.period * 1e3) / cores
+    verdict = "ok" if load < 0.6 else "tight: try --pack auto" if load < 0.9 else "too much: use --pack auto or --speed max"
+    table.add_row(f"load of {mission.name} at speed 1", f"{load:.0%} of the machine", verdict)
+    try:
+        block = reserve([spec.uav for spec in mission.vehicles])
+        table.add_row("ports", f"{block.base}-{block.base + block.size - 1}", "free")
+        block.release()
+    except PortError as error:
+        table.add_row("ports", str(error), "missing")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    table.add_row("Chromium (browser tests)", chromium or "not found", "ok" if chromium and driver else "optional")
+    vulkan = sorted(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
+    table.add_row(
+        "Mesa Vulkan (pictures without a screen)",
+        ", ".join(path.stem for path in vulkan[:3]) or "not found",
+        "ok" if vulkan else "optional: mesa-vulkan-drivers",
+    )
+    from ftcc.link.compiled import cache_folder
+
+    compiled = len(list(cache_folder.rglob("*.nbi")))
+    table.add_row("compiled code", str(cache_folder), f"{compiled} functions" if compiled else "compiled at first start")
+    console.print(table)

@@ -1,0 +1,217 @@
+"""Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
+
+An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``. Beside the recorded columns there
+are, for followers of a graph with leaders, ``z_d`` (the altitude that its hull weights give it) and ``hull_distance`` (how
+far it is above or below all leaders).
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.graph import Assumption, Graph, GraphError
+
+__all__ = ["DERIVED", "METRICS", "Metric", "Signals", "check_expression", "evaluated", "names_in", "window_of"]
+
+Array = NDArray[np.float64]
+
+DERIVED = {"z_d": "altitude of the containment point, m", "hull_distance": "distance outside the leaders' altitudes, m"}
+
+_CLOSE = 1e-9
+"""Rounding of times, s."""
+
+
+class Signals(Protocol):
+    """A recording, on disk or in memory."""
+
+    @property
+    def uavs(self) -> tuple[int, ...]: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    def column(self, name: str, uav: int) -> Array: ...
+
+
+# --- expressions -----------------------------------------------------------------------------------------------------
+
+_OPERATORS: dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": np.abs,
+    "round": np.round,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "exp": np.exp,
+    "degrees": np.degrees,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+
+
+def _parsed(expression: str) -> ast.expr:
+    try:
+        return ast.parse(expression.strip(), mode="eval").body
+    except SyntaxError as error:
+        raise ValueError(f"{expression!r} is no expression: {error.msg}") from None
+
+
+def names_in(expression: str) -> set[str]:
+    """The column names that an expression uses.
+
+    Raises
+    ------
+    ValueError
+        If it is not arithmetic over columns.
+    """
+    names = set()
+    called = set()
+    for node in ast.walk(_parsed(expression)):
+        if isinstance(node, ast.Call):
+            if not isinstance(node.func, ast.Name) or node.func.id not in _FUNCTIONS or node.keywords:
+                raise ValueError(f"{expression!r}: functions are {', '.join(_FUNCTIONS)}")
+            called.add(id(node.func))
+        elif isinstance(node, ast.Name):
+            names.add((id(node), node.id))
+        elif isinstance(node, (ast.BinOp, ast.UnaryOp)):
+            if type(node.op) not in _OPERATORS:
+                raise ValueError(f"{expression!r}: operators are + - * / **")
+        elif isinstance(node, ast.Constant):
+            if not isinstance(node.value, (int, float)) or isinstance(node.value, bool):
+                raise ValueError(f"{expression!r}: {node.value!r} is not a number")
+        elif not isinstance(node, (ast.operator, ast.unaryop, ast.expr_context)):
+            raise ValueError(f"{expression!r}: only arithmetic over columns is allowed")
+    return {name for key, name in names if key not in called}
+
+
+def check_expression(expression: str, columns: Iterable[str]) -> None:
+    """Raise `ValueError`, naming what there is, if an expression is none or uses a column that does not exist."""
+    known = [*columns, *DERIVED]
+    unknown = sorted(names_in(expression) - set(known))
+    if unknown:
+        raise ValueError(f"{expression!r}: there is no column {', '.join(unknown)}; there are {', '.join(known)}")
+
+
+def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
+    """An expression for one UAV, at all its recorded times."""
+    values = {name: _column(name, signals, graph, uav) for name in names_in(expression)}
+
+    def value(node: ast.expr) -> Any:
+        if isinstance(node, ast.BinOp):
+            return _OPERATORS[type(node.op)](value(node.left), value(node.right))
+        if isinstance(node, ast.UnaryOp):
+            return _OPERATORS[type(node.op)](value(node.operand))
+        if isinstance(node, ast.Call):
+            assert isinstance(node.func, ast.Name)
+            return _FUNCTIONS[node.func.id](*(value(argument) for argument in node.args))
+        if isinstance(node, ast.Name):
+            return values[node.id]
+        assert isinstance(node, ast.Constant)
+        return node.value
+
+    return np.broadcast_to(np.asarray(value(_parsed(expression)), np.float64), signals.column("t", uav).shape)
+
+
+def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
+    if name not in DERIVED:
+        return signals.column(name, uav)
+    altitudes = _leaders_altitudes(signals, graph, signals.column("t", uav))
+    if name == "hull_distance":
+        z = signals.column("z", uav)
+        return np.maximum(np.maximum(altitudes.min(axis=0) - z, z - altitudes.max(axis=0)), 0.0)
+    if uav not in graph.followers:
+        return np.full(altitudes.shape[1], np.nan)
+    weights: Array = graph.hull_weights[graph.followers.index(uav)]
+    # Summed leader by leader: the same bits on every machine.
+    return sum((w * z for w, z in zip(weights, altitudes, strict=True)), np.zeros(altitudes.shape[1]))
+
+
+def _leaders_altitudes(signals: Signals, graph: Graph, t: Array) -> Array:
+    """Altitudes of the leaders at times ``t``, shape (leaders, n); nan where a leader was not recorded."""
+    try:
+        graph.require(Assumption.LEADERS_REACH_ALL)
+    except GraphError as error:
+        raise ValueError(f"z_d and hull_distance need leaders: {error}") from None
+    rows = np.full((len(graph.leaders), len(t)), np.nan)
+    for row, leader in zip(rows, graph.leaders, strict=True):
+        times, z = signals.column("t", leader), signals.column("z", leader)
+        if len(times) == 0:
+            continue
+        place = np.minimum(np.searchsorted(times, t - _CLOSE), len(times) - 1)
+        found = np.abs(times[place] - t) <= _CLOSE
+        row[found] = z[place][found]
+    return rows
+
+
+def window_of(t: Array, window: tuple[float, float]) -> slice:
+    """The rows within a window, both ends included."""
+    first = int(np.searchsorted(t, window[0] - _CLOSE))
+    return slice(first, int(np.searchsorted(t, window[1] + _CLOSE)))
+
+
+# --- metrics ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number from the rows of one UAV, and how the UAVs' numbers become one."""
+
+    function: Callable[[Array, Array, float], float]
+    """(times, values, threshold) -> number; all within the window."""
+    across: str
+    """"max" or "min" over the UAVs, or "farthest": that of the UAV farthest from the expected value."""
+    meaning: str
+    threshold: bool = False
+    """Whether it needs one."""
+
+
+def _time_until_below(t: Array, x: Array, threshold: float) -> float:
+    above = np.flatnonzero(~(np.abs(x) <= threshold))
+    if len(above) == 0:
+        return 0.0
+    return math.inf if above[-1] == len(x) - 1 else float(t[above[-1]] - t[0])
+
+
+def _first_time(t: Array, x: Array, threshold: float) -> float:
+    there = np.flatnonzero(np.abs(x) >= threshold)
+    return float(t[there[0]]) if len(there) else math.inf
+
+
+def _duration_above(t: Array, x: Array, threshold: float) -> float:
+    spacing = float(t[1] - t[0]) if len(t) > 1 else 0.0
+    return float((x >= threshold).sum()) * spacing
+
+
+METRICS = {
+    "value_at": Metric(lambda t, x, _: float(x[-1]), "farthest", "value at the end of the window"),
+    "max_abs": Metric(lambda t, x, _: float(np.abs(x).max()), "max", "largest absolute value"),
+    "max": Metric(lambda t, x, _: float(x.max()), "max", "largest value"),
+    "min": Metric(lambda t, x, _: float(x.min()), "min", "smallest value"),
+    "mean": Metric(lambda t, x, _: float(x.mean()), "farthest", "mean"),
+    "std": Metric(lambda t, x, _: float(x.std()), "max", "standard deviation"),
+    "rms": Metric(lambda t, x, _: float(np.sqrt((x * x).mean())), "max", "root mean square"),
+    "integral_of_square": Metric(
+        lambda t, x, _: float(np.trapezoid(x * x, t)), "max", "integral of the square over the window"
+    ),
+    "time_until_below": Metric(
+        _time_until_below, "max", "time from the window's beginning until abs(x) stays within the threshold, s", True
+    ),
+    "first_time": Metric(_first_time, "max", "time at which abs(x) first reaches the threshold, s", True),
+    "duration_above": Metric(_duration_above, "max", "time for which x is at or above the threshold, s", True),
+}

@@ -1,0 +1,254 @@
+"""A run's folder: what was flown, what happened, and the recording.
+
+``scenario.toml`` (as flown), ``parts/`` (what each process wrote), ``events.jsonl``, ``signals.parquet``, ``report/``.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.recording import Column, arrow_schema, read_events, read_part
+from ftcc.sim.plant import TRUTH
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Scenario
+
+__all__ = ["LEADING", "Run", "RunError", "new_folder", "write_signals"]
+
+_SHOWN = ("thrust", "elevator", "aileron", "rudder")
+
+LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
+"""The first columns of ``signals.parquet``; the scheme's SIGNALS follow."""
+
+
+class RunError(ValueError):
+    """A folder that is no run, or a run that cannot be read."""
+
+
+def new_folder(name: str, out: str | Path | None = None) -> Path:
+    """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the present folder.
+
+    Raises
+    ------
+    RunError
+        If it cannot be written, or ``out`` already holds a run.
+    """
+    if out is None:
+        stem = Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+        tries = [stem, *(stem.with_name(f"{stem.name}-{n}") for n in range(2, 100))]
+        folder = next(path for path in tries if not path.exists())
+    else:
+        folder = Path(out)
+    if (folder / "scenario.toml").exists():
+        raise RunError(f"--out {folder}: already holds a run; give a folder that is empty or does not exist")
+    try:
+        (folder / "parts").mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(f"no permission to write into {folder}")
+    except OSError as error:
+        raise RunError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
+    return folder
+
+
+def _ordered(columns: Sequence[Column]) -> list[Column]:
+    """Columns without repetition, the leading ones first."""
+    unique = {column.name: column for column in reversed(columns)}
+    first = [unique[name] for name in LEADING if name in unique]
+    rest = [column for column in dict.fromkeys(unique[c.name] for c in columns) if column.name not in LEADING]
+    return first + rest
+
+
+def write_signals(path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> None:
+    """Write a recording: a Parquet file that appears when it is complete.
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of Column
+        Of all parts, repetitions allowed.
+    values : mapping of arrays by column name, one row per tick and UAV.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    ordered = _ordered(columns)
+    table = pa.Table.from_arrays([pa.array(values[c.name]) for c in ordered], schema=arrow_schema(ordered))
+    unfinished = path.with_suffix(".unfinished")
+    pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
+    unfinished.replace(path)
+
+
+class Run:
+    """A recorded flight.
+
+    Parameters
+    ----------
+    path : str or Path
+        The run's folder.
+
+    Raises
+    ------
+    RunError
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not (self.path / "scenario.toml").is_file():
+            raise RunError(f"{self.path}: is no run's folder (there is no scenario.toml in it)")
+
+    @functools.cached_property
+    def scenario(self) -> Scenario:
+        """The scenario as flown."""
+        from ftcc.groundside.scenario import load
+
+        return load(self.path / "scenario.toml")
+
+    @functools.cached_property
+    def mission(self) -> Mission:
+        """The scenario resolved: graph, scheme, timing, claims."""
+        from ftcc.groundside.mission import resolve
+
+        return resolve(self.scenario)
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened, in order of simulated time: t, uav, severity, text."""
+        return read_events(self.path / "events.jsonl")
+
+    @property
+    def lost(self) -> dict[int, str]:
+        """UAVs that did not end the flight, and why."""
+        return {e["uav"]: e["text"] for e in self.events if e.get("kind") == "lost" and e.get("uav") is not None}
+
+    @property
+    def file(self) -> Path:
+        """``signals.parquet``, merged from the parts if need be."""
+        path = self.path / "signals.parquet"
+        return path if path.is_file() else self.merge()
+
+    @functools.cached_property
+    def signals(self) -> Any:
+        """The recording as a ``pyarrow.Table``: a row per recorded tick and UAV; units in the columns' metadata."""
+        import pyarrow.parquet as pq
+
+        return pq.read_table(self.file)
+
+    @functools.cached_property
+    def columns(self) -> dict[str, Column]:
+        """Name, unit and meaning of every column."""
+        import pyarrow.parquet as pq
+
+        found = {}
+        for field in pq.read_schema(self.file):
+            notes = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+            found[field.name] = Column(field.name, notes.get("unit", ""), notes.get("meaning", ""))
+        return found
+
+    @functools.cached_property
+    def _rows(self) -> tuple[NDArray[np.int64], dict[int, slice]]:
+        """Order that sorts the rows by UAV, and where each UAV's rows then are."""
+        uavs = self._read("uav")
+        order = np.argsort(uavs, kind="stable")
+        ids, starts = np.unique(uavs[order], return_index=True)
+        ends = np.append(starts[1:], len(uavs))
+        return order, {int(uav): slice(int(a), int(b)) for uav, a, b in zip(ids, starts, ends, strict=True)}
+
+    def _read(self, name: str) -> NDArray[Any]:
+        import pyarrow.parquet as pq
+
+        if name not in self.columns:
+            raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
+        return pq.read_table(self.file, columns=[name]).column(0).to_numpy()  # type: ignore[no-any-return]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.columns)
+
+    @property
+    def uavs(self) -> tuple[int, ...]:
+        """Ids of those of whom there are rows."""
+        return tuple(self._rows[1])
+
+    @functools.cache  # noqa: B019 (a run is short-lived, its columns are read again and again)
+    def _sorted(self, name: str) -> NDArray[Any]:
+        return self._read(name)[self._rows[0]]  # type: ignore[no-any-return]
+
+    def column(self, name: str, uav: int) -> NDArray[np.float64]:
+        """A column of one UAV in order of time; empty if the UAV has no rows."""
+        place = self._rows[1].get(uav)
+        return self._sorted(name)[place] if place is not None else np.empty(0)
+
+    def merge(self) -> Path:
+        """Join what the processes wrote into ``signals.parquet``; what a killed one wrote counts to its last batch.
+
+        Rows are joined on time and UAV; where one of a UAV's two processes wrote nothing, the value is nan.
+
+        Raises
+        ------
+        RunError
+            If no process wrote anything.
+        """
+        tables: dict[int, list[Any]] = {}
+        for path in sorted((self.path / "parts").glob("*.arrows")):
+            table = read_part(path)
+            if table is not None:
+                # The vehicle's part first: its columns lead.
+                tables.setdefault(int(path.name.split("-")[0]), []).append((path.stem.endswith("autopilot"), table))
+        if not any(table.num_rows for pairs in tables.values() for _, table in pairs):
+            raise RunError(f"{self.path}: nothing was recorded")
+        parts = {uav: [table for _, table in sorted(pairs, key=lambda p: p[0])] for uav, pairs in tables.items()}
+        columns = [
+            Column(f.name, f.metadata[b"unit"].decode(), f.metadata[b"meaning"].decode())
+            for after in (False, True)
+            for pairs in tables.values()
+            for autopilot, table in pairs
+            if autopilot == after
+            for f in table.schema
+        ]
+        joined = [_joined(uav, parts[uav], [c.name for c in columns]) for uav in sorted(parts)]
+        values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
+        order = np.lexsort((values["uav"], values["t"]))
+        target = self.path / "signals.parquet"
+        write_signals(target, columns, {name: column[order] for name, column in values.items()})
+        self.__dict__.pop("signals", None)
+        return target
+
+    def export_csv(self, file: Path) -> None:
+        """Write the recording as comma-separated values, names in the first line."""
+        import pyarrow.csv as pc
+
+        pc.write_csv(self.signals, file)
+
+    def export_mat(self, file: Path) -> None:
+        """Write the recording for MATLAB: a struct ``uavN`` per UAV with a field per column, and a struct ``units``."""
+        from scipy.io import savemat
+
+        contents: dict[str, Any] = {
+            f"uav{uav}": {name: self.column(name, uav) for name in self.names if name != "uav"} for uav in self.uavs
+        }
+        contents["units"] = {column.name: column.unit for column in self.columns.values() if column.name != "uav"}
+        savemat(file, contents, do_compression=True, oned_as="column")
+
+
+def _joined(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """The parts of one UAV side by side, a row for every time that occurs."""
+    times = [table.column("t").to_numpy() for table in tables]
+    t = np.unique(np.concatenate(times))
+    joined: dict[str, NDArray[Any]] = {name: np.full(len(t), np.nan) for name in names}
+    joined["t"], joined["uav"] = t, np.full(len(t), uav, np.int32)
+    for table, own in zip(tables, times, strict=True):
+        rows = np.searchsorted(t, own)
+        for name in table.column_names:
+            if name not in ("t", "uav"):
+                joined[name][rows] = table.column(name).to_numpy()
+    return joined

@@ -1,0 +1,195 @@
+"""A whole flight in one process: the same functions in the same order as between processes, and the same recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.autopilots import build as build_autopilots
+from ftcc.airside.autopilots import link_events, tick_of
+from ftcc.groundside.mission import Mission
+from ftcc.groundside.run import Run, write_signals
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.compiled import instantiate
+from ftcc.link.recording import EventLog
+from ftcc.sim.plant import LOST, TRUTH
+from ftcc.sim.spec import build as build_vehicles
+
+__all__ = ["Flight", "fly", "simulate"]
+
+_CHUNKS = 100
+"""A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight in memory; offers its columns as a `Run` does."""
+
+    mission: Mission
+    truth: NDArray[np.float64]
+    """(n, k, 13): recorded tick, UAV in the order of the mission, in the order of ``TRUTH``; nan once a UAV is lost."""
+    command: NDArray[np.float64]
+    """(n, k, 4): in force, in the order of ``ACTUATORS``."""
+    acting: NDArray[np.float64]
+    """(n, k, 4): what acts on the airframe."""
+    signals: NDArray[np.float64]
+    """(n, k, s): in the order of the scheme's ``SIGNALS``."""
+    t: NDArray[np.float64]
+    """(n,): s."""
+    lost: dict[int, tuple[float, str]]
+    """When (s) and why a UAV was lost."""
+
+    @property
+    def uavs(self) -> tuple[int, ...]:
+        """Ids, ascending."""
+        return tuple(sorted(self.mission.uavs))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self._places)
+
+    @property
+    def _places(self) -> dict[str, tuple[NDArray[np.float64], int]]:
+        places = {name: (self.truth, n) for n, name in enumerate(TRUTH)}
+        places |= {f"{name}_command": (self.command, n) for n, name in enumerate(ACTUATORS)}
+        places |= {name: (self.acting, n) for n, name in enumerate(ACTUATORS)}
+        return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
+
+    def column(self, name: str, uav: int) -> NDArray[np.float64]:
+        """A column of one UAV in order of time, as far as it flew."""
+        i = self.mission.uavs.index(uav)
+        rows = int(np.isfinite(self.truth[:, i, 0]).sum())
+        if name == "t":
+            return self.t[:rows]
+        values, n = self._places[name]
+        return values[:rows, i, n]
+
+    def table(self) -> dict[str, NDArray[Any]]:
+        """All columns, a row per recorded tick and UAV, by time, then UAV."""
+        order = np.argsort(self.mission.uavs)
+        flown = np.isfinite(self.truth[:, order, 0]).ravel()
+        table: dict[str, NDArray[Any]] = {
+            "t": np.repeat(self.t, len(order))[flown],
+            "uav": np.tile(np.array(self.mission.uavs, np.int32)[order], len(self.t))[flown],
+        }
+        for name, (values, n) in self._places.items():
+            table[name] = values[:, order, n].ravel()[flown]
+        return table
+
+
+def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
+    """Everything that the compiled loop works on, before the first tick."""
+    autopilots, inbox = build_autopilots(mission.autopilots, mission.timing)
+    k = len(mission.uavs)
+    sender = np.zeros(inbox.valid.shape, np.int64)
+    for i, spec in enumerate(mission.autopilots):
+        sender[i, : len(spec.neighbours)] = [mission.uavs.index(neighbour.uav) for neighbour in spec.neighbours]
+    ether = loop.Ether(
+        sender=sender,
+        sent=np.zeros(k, np.int64),
+        stamp=np.zeros((k, loop.HISTORY), np.int64),
+        radio_on=np.zeros((k, loop.HISTORY), np.int64),
+        values=np.zeros((k, loop.HISTORY, mission.scheme.shared_width)),
+    )
+    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), len(mission.scheme.signals))
+    recording = loop.Recording(
+        *(np.full((rows, k, width), np.nan) for width in widths), np.zeros(k, np.int64), np.zeros(k, np.int64)
+    )
+    scratch = loop.Scratch(np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(ACTUATORS)))
+    events = link_events(mission.autopilots)
+    return build_vehicles(mission.vehicles), autopilots, inbox, events, ether, recording, scratch
+
+
+def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], None] | None = None) -> Flight:
+    """Fly a mission in memory.
+
+    Parameters
+    ----------
+    mission : Mission
+    progress : callable, optional
+        Called with the simulated time, s.
+    ready : callable, optional
+        Called once when everything is compiled, before the first tick.
+    """
+    timing = mission.timing
+    loop = instantiate("ftcc.groundside.flight_loop", mission.scheme.name, tick=tick_of(mission.scheme.name))
+    rows = timing.ticks // timing.record_every + 1
+    arrays = _arrays(mission, loop, rows)
+    constants = (
+        timing.period_us,
+        timing.exchange_us,
+        timing.latency_us,
+        timing.step_us,
+        timing.record_every,
+        timing.seed,
+        mission.wire,
+    )
+    loop.fly(*arrays, *constants, 0, 0)
+    if ready is not None:
+        ready()
+    end = timing.ticks + 1
+    chunk = max(1, -(-end // _CHUNKS))
+    flown = 0
+    interrupted = False
+    while flown < end and not interrupted:
+        try:
+            loop.fly(*arrays, *constants, flown, min(end, flown + chunk))
+            flown = min(end, flown + chunk)
+            if progress is not None:
+                progress((flown - 1) * timing.period)
+        except KeyboardInterrupt:
+            # What has been flown is recorded; a shorter flight than was asked for is not hidden.
+            interrupted = True
+    recording = arrays[5]
+    rows = (flown - 1) // timing.record_every + 1 if flown else 0
+    return Flight(
+        mission=mission,
+        truth=recording.truth[:rows],
+        command=recording.command[:rows],
+        acting=recording.acting[:rows],
+        signals=recording.signals[:rows],
+        t=np.arange(rows) * timing.record_every * timing.period_us / 1e6,
+        lost={
+            uav: (float(recording.lost_us[i] / 1e6), LOST[int(recording.lost[i])])
+            for i, uav in enumerate(mission.uavs)
+            if recording.lost[i] > 0
+        },
+    )
+
+
+def simulate(
+    mission: Mission, folder: Path, progress: Progress | None = None, ready: Callable[[], None] | None = None
+) -> Run:
+    """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
+    flight = fly(mission, progress, ready)
+
+    # Arrow, and what the columns' descriptions pull in, are not needed before the flight.
+    from ftcc.airside.process import columns as autopilot_columns
+    from ftcc.sim.process import COLUMNS
+
+    events = EventLog(folder / "events.jsonl")
+    for t, uav, text in mission.events:
+        if len(flight.t) and t <= flight.t[-1]:
+            events.write(t, text, uav)
+    for uav, (t, why) in flight.lost.items():
+        events.write(t, f"UAV {uav} lost: {why}", uav, "error", kind="lost")
+    last = float(flight.t[-1]) if len(flight.t) else 0.0
+    if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
+        events.write(last, "interrupted", severity="warning")
+    events.close()
+    write_signals(
+        folder / "signals.parquet", (*COLUMNS, *autopilot_columns(mission.scheme.name)), flight.table()
+    )
+    return Run(folder)

@@ -1,0 +1,258 @@
+"""The Rerun viewer beside the station: a process of its own, fed by a thread that the swarm never waits for.
+
+Rerun's client holds back its caller once a viewer has stopped reading, for ever if the viewer never reads again, and
+with it every other sink of the same stream. So the viewer has a stream of its own, written by a thread from a bounded
+queue; what does not fit is not shown. A client that is being held back lets go when the viewer's process ends.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import queue
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.parse
+import webbrowser
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+__all__ = ["BLUEPRINT", "Entry", "Kind", "Viewer", "write"]
+
+Kind = Literal["web", "native", "none"]
+
+_LOOPBACK = "127.0.0.1"
+_START = 20.0
+"""Longest wait for the viewer to listen, s."""
+_WAITING = 64
+"""Frames that wait for the viewer; at 10 Hz the six seconds that a slow start takes."""
+
+_DIE_WITH_PARENT = """
+import ctypes, os, signal, sys
+PR_SET_PDEATHSIG = 1
+ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+if os.getppid() != int(sys.argv[1]):
+    sys.exit("the station ended before its viewer began")
+os.execv(sys.argv[2], sys.argv[2:])
+"""
+"""Runs a program that is killed when the process that started it ends, however that ends (Linux).
+
+A short-lived interpreter sets this for itself and becomes the program: a function run between fork and exec in the
+station, which has threads, could deadlock.
+"""
+
+
+BLUEPRINT = ""
+"""Path of an entry that is a blueprint, not an entity."""
+
+
+class Entry(NamedTuple):
+    """Something to log."""
+
+    path: str
+    """Entity."""
+    t: float | None
+    """Simulated time, s; None = holds at all times."""
+    what: Any
+    """Archetype."""
+
+
+def write(stream: rr.RecordingStream, entries: Iterable[Entry]) -> None:
+    """Log ``entries``."""
+    now = None
+    for path, t, what in entries:
+        if path == BLUEPRINT:
+            stream.send_blueprint(what)
+            continue
+        if t is None:
+            stream.log(path, what, static=True)
+            continue
+        if t != now:
+            stream.set_time("t", duration=t)
+            now = t
+        stream.log(path, what)
+
+
+class Viewer:
+    """A viewer that runs as long as this object, or shorter.
+
+    The thread that creates it must live as long as the process (Linux ends the viewer with that thread).
+
+    Parameters
+    ----------
+    kind : "web" or "native"
+        A server with the page that a browser shows, on loopback only, or a window.
+    ports : (int, int), optional
+        Of the data and of the page; free ones if None.
+    open_browser : bool
+        Show the page in the user's browser, if there is a screen.
+    connect : callable
+        Gives the stream to the viewer at an address; may block.
+    """
+
+    address: str | None
+    """Of the page."""
+
+    def __init__(
+        self,
+        kind: Literal["web", "native"],
+        ports: tuple[int, int] | None,
+        open_browser: bool,
+        connect: Callable[[str], rr.RecordingStream],
+    ) -> None:
+        data_port, page_port = ports or (_free_port(), _free_port())
+        self._data_port = data_port
+        self._url = f"rerun+http://{_LOOPBACK}:{data_port}/proxy"
+        self.address = None
+        options = ["--bind", _LOOPBACK, "--port", str(data_port)]
+        if kind == "web":
+            self.address = f"http://{_LOOPBACK}:{page_port}/?url={urllib.parse.quote(self._url, safe='')}"
+            options += ["--serve-web", "--web-viewer-port", str(page_port), "--server-memory-limit", "256MB"]
+        else:
+            options += ["--memory-limit", "1GB", "--server-memory-limit", "64MB", "--hide-welcome-screen"]
+            options += ["--expect-data-soon"]
+        self._open_browser = open_browser
+        self._connect = connect
+        self._problem: str | None = None
+        self._reported: set[str] = set()
+        self._ended = threading.Event()
+        self._frames: queue.Queue[list[Entry] | None] = queue.Queue(_WAITING)
+        self._words = tempfile.TemporaryFile()
+        self._process = self._start(options, [data_port, page_port] if kind == "web" else [data_port])
+        self._thread = threading.Thread(target=self._feed, name="viewer", daemon=True)
+        self._thread.start()
+
+    def show(self, entries: list[Entry]) -> None:
+        """Show ``entries`` soon, or never; returns at once."""
+        if self._ended.is_set():
+            return
+        try:
+            self._frames.put_nowait(entries)
+        except queue.Full:
+            self._report("the viewer does not keep up: not everything is shown")
+
+    def take_problem(self) -> str | None:
+        """What went wrong since the last call; each kind of problem once."""
+        problem, self._problem = self._problem, None
+        return problem
+
+    def close(self) -> None:
+        """Let the viewer read what was sent, for up to a second, and end it."""
+        self._ended.set()
+        try:
+            self._frames.put_nowait(None)
+        except queue.Full:
+            pass  # The viewer has stopped reading: nothing that it could be given any more.
+        else:
+            self._thread.join(1.0)
+        if self._process is not None:
+            self._process.terminate()
+            try:
+                self._process.wait(0.3)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+        # Whatever held the thread back ended with the process; it then sees that the viewer is gone.
+        self._thread.join(0.5)
+        self._words.close()
+
+    def _start(self, options: list[str], ports: list[int]) -> subprocess.Popen[bytes] | None:
+        for port in ports:
+            if _listening(port):
+                self._report(f"no viewer: port {port} is in use")
+                return None
+        program = [str(_executable()), *options]
+        if sys.platform == "linux":
+            program = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid()), *program]
+        # With CI set, Rerun neither sends usage statistics nor leaves their files in the user's home.
+        environment = {"RUST_LOG": "warn"} | os.environ | {"CI": "true"}
+        # A session of its own: Ctrl-C is for the station, which ends the viewer when all is written.
+        return subprocess.Popen(
+            program,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=self._words,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+    def _feed(self) -> None:
+        try:
+            self._show_all()
+        except Exception as error:  # Whatever happens to the viewer must not happen to the swarm.
+            self._report(f"the viewer shows no more: {error}")
+        self._ended.set()
+
+    def _show_all(self) -> None:
+        if self._process is None or not self._listens():
+            return
+        if self.address and self._open_browser and _has_screen():
+            webbrowser.open(self.address)
+        stream = self._connect(self._url)
+        while (entries := self._frames.get()) is not None:
+            if self._process.poll() is not None:
+                self._report(f"the viewer ended{self._last_words()}; the flight and its recording go on")
+                break
+            write(stream, entries)
+        # Until the viewer has read everything, or has ended.
+        stream.disconnect()
+
+    def _listens(self) -> bool:
+        """Wait until the viewer listens; False if it will not."""
+        assert self._process is not None
+        deadline = time.monotonic() + _START
+        while time.monotonic() < deadline and not self._ended.is_set():
+            if self._process.poll() is not None:
+                self._report(f"no viewer: it ended at once{self._last_words()}")
+                return False
+            if _listening(self._data_port):
+                return True
+            time.sleep(0.05)
+        if not self._ended.is_set():
+            self._report("no viewer: it does not answer")
+        return False
+
+    def _last_words(self) -> str:
+        assert self._process is not None
+        self._words.seek(0)
+        lines = self._words.read().decode(errors="replace").strip().splitlines()
+        return f" (exit code {self._process.returncode})" + (f", saying: {lines[-1]}" if lines else "")
+
+    def _report(self, problem: str) -> None:
+        if problem not in self._reported:
+            self._reported.add(problem)
+            self._problem = problem
+
+
+def _executable() -> Path:
+    """The viewer that the package rerun-sdk brings."""
+    found = importlib.util.find_spec("rerun_cli")
+    assert found is not None and found.origin is not None
+    folder = Path(found.origin).parent
+    bundled = folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun"
+    return bundled if bundled.exists() else folder / "rerun"
+
+
+def _listening(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(0.5)
+        return probe.connect_ex((_LOOPBACK, port)) == 0
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((_LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _has_screen() -> bool:
+    return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,0 +1,83 @@
+"""A flight with processes equals the single-process simulation, bit for bit."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.sitl.conftest import Flight
+
+DURATION = "30"
+
+
+def signals(folder: Path):  # type: ignore[no-untyped-def]
+    return pq.read_table(folder / "signals.parquet")
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Run folder of `ftcc simulate containment` with the given variants and seed."""
+    from ftcc.groundside.mission import resolve
+    from ftcc.groundside.scenario import load
+    from ftcc.groundside.simulate import simulate
+
+    def run(variants: tuple[str, ...] = (), seed: int = 1) -> Path:
+        folder = tmp_path_factory.mktemp("simulated") / "run"
+        scenario = load("containment", form="flight", variants=variants, seed=seed, duration=float(DURATION))
+        simulate(resolve(scenario), folder)
+        return folder
+
+    return run
+
+
+def burn() -> None:
+    while True:
+        sum(range(1000))
+
+
+@pytest.fixture()
+def busy_machine() -> Iterator[None]:
+    """Two processes that take what they can get of both cores."""
+    workers = [multiprocessing.get_context("spawn").Process(target=burn, daemon=True) for _ in range(2)]
+    for worker in workers:
+        worker.start()
+    yield
+    for worker in workers:
+        worker.kill()
+        worker.join()
+
+
+def test_sixteen_processes_equal_the_simulation(fly: Callable[..., Flight], simulated: Callable[..., Path]) -> None:
+    flight = fly("containment", "--speed", "max", "--duration", DURATION, "--seed", "1")
+    assert flight.wait() == 0, flight.output
+    assert signals(flight.folder).equals(signals(simulated()))
+
+
+def test_with_loss_on_a_loaded_machine_too(
+    fly: Callable[..., Flight], simulated: Callable[..., Path], busy_machine: None
+) -> None:
+    flight = fly("containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1")
+    assert flight.wait(240) == 0, flight.output
+    assert signals(flight.folder).equals(signals(simulated(("loss30",))))
+
+
+@pytest.mark.parametrize("pack", ["3", "auto"])
+def test_packed_vehicles_equal_the_simulation(
+    fly: Callable[..., Flight], simulated: Callable[..., Path], pack: str
+) -> None:
+    flight = fly(
+        "containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1", "--pack", pack
+    )
+    assert flight.wait() == 0, flight.output
+    assert signals(flight.folder).equals(signals(simulated(("loss30",))))
+
+
+def test_another_seed_is_another_flight_only_where_chance_plays(simulated: Callable[..., Path]) -> None:
+    lossless = signals(simulated((), 1)), signals(simulated((), 2))
+    lossy = signals(simulated(("loss30",), 1)), signals(simulated(("loss30",), 2))
+    assert lossless[0].equals(lossless[1])
+    assert not lossy[0].equals(lossy[1])
