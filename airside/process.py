@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import collections
 import functools
+import time
 from collections.abc import Sequence
 from types import ModuleType
 
@@ -38,6 +39,8 @@ __all__ = ["Crew", "columns", "load_compiled", "run"]
 
 _AHEAD = 4
 """Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
+_POLL = 0.001
+"""Wall time between two looks at the mesh while a record or a greeting is awaited, s."""
 _NOTHING_MORE = 2**31 - 1
 """Sequence number acknowledged by a UAV that hears nobody, or has ended."""
 
@@ -111,6 +114,8 @@ class Crew:
         self.edge = [{n.uav: e for e, n in enumerate(spec.neighbours)} for spec in specs]
         self.acknowledged: dict[int, int] = {}
         """Lockstep: what each hearer outside this process has acknowledged."""
+        self.complete = -1
+        """Lockstep: all records up to this sequence number are here."""
         self.bad_records = 0
         ports = [setting.ports[spec.uav] for spec in specs]
         self.vehicles = [
@@ -130,8 +135,6 @@ class Crew:
         self.waiter.add(gate, gate.read)
         for i, vehicle in enumerate(self.vehicles):
             self.waiter.add(vehicle, functools.partial(self.listen, i))
-        if self.mesh:
-            self.waiter.add(self.mesh, self.take_records)
         load_compiled(self.autopilots, self.inbox, self.events, self.law)
 
     def _open_mesh(self) -> Mesh | None:
@@ -160,7 +163,7 @@ class Crew:
         while self.mesh and not self.mesh.ready:
             if self.gate.stopping:
                 return
-            self.waiter.wait(0.2)
+            self.waiter.wait(_POLL)
             if self.stall.long:
                 self.gate.tell(Said("warning", f"mesh: still waiting for {', '.join(self.mesh.awaited)}"))
 
@@ -353,7 +356,7 @@ class Crew:
                 continue
             state, controls = np.zeros(13), np.zeros(4)
             tick = read_state(messages[:3], state, controls) // self.timing.period_us
-            messages = messages[3:]
+            messages = messages[3:] if tick >= 0 else messages[1:]
             newest = self.states[i][-1][0] if self.states[i] else int(self.done[i])
             if tick > newest:
                 self.states[i].append((tick, state, controls))
@@ -363,13 +366,15 @@ class Crew:
     def wait(self, tick: int) -> bool:
         """Lockstep: wait until everything that tick needs is here; False if the flight is to end."""
         self.stall.progress()
-        while True:
-            if self.gate.stopping:
-                return False
-            missing = self.missing(tick)
+        sent = time.monotonic()
+        while not self.gate.stopping:
+            missing = self.missing_state() or self.missing_records(tick)
             if not missing:
                 return True
-            if not self.waiter.wait(RESEND):
+            # States wake this process up; the mesh is polled, and only by who needs a record.
+            self.waiter.wait(RESEND if self.missing_state() else _POLL)
+            if time.monotonic() - sent > RESEND:
+                sent = time.monotonic()
                 for i in _those(self.alive):
                     if not self.states[i]:
                         self.vehicles[i].send_again()
@@ -377,30 +382,45 @@ class Crew:
                     self.stall.progress()
                 elif self.stall.long:
                     self.gate.tell(Said("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {missing}"))
+        return False
 
     @property
     def names(self) -> str:
         return ", ".join(str(spec.uav) for spec in self.specs)
 
-    def missing(self, tick: int) -> str:
-        """What a tick still needs, as text; empty if nothing."""
-        due = self.now_us(tick) - self.timing.latency_us
-        needed = due // self.timing.exchange_us if due >= 0 else -1
+    def missing_state(self) -> str:
+        """Whose state is still awaited, as text; empty if nobody's."""
         for i in _those(self.alive):
             if not self.states[i]:
                 return f"the state of UAV {self.specs[i].uav}"
-            for sender, link in self.links[i].items():
-                if sender not in self.index and link.newest < needed:
-                    if link.ended or sender in self.gate.gone:
-                        continue
-                    return f"record {needed} of UAV {sender}"
-        if tick % self.timing.exchange_every == 0:
-            sequence = tick // self.timing.exchange_every
-            window = _AHEAD - (-self.timing.latency_us // self.timing.exchange_us)
-            for hearer, heard in self.acknowledged.items():
-                if sequence - window > heard and hearer not in self.gate.gone:
-                    return f"UAV {hearer} to acknowledge record {sequence - window}"
         return ""
+
+    def missing_records(self, tick: int) -> str:
+        """What a tick still needs of the mesh, as text; empty if nothing."""
+        if self.mesh is None:
+            return ""
+        due = self.now_us(tick) - self.timing.latency_us
+        needed = due // self.timing.exchange_us if due >= 0 else -1
+        tells = tick % self.timing.exchange_every == 0
+        if needed == self.complete and not tells:
+            return ""
+        self.take_records()
+        for i in _those(self.alive):
+            for sender, link in self.links[i].items():
+                if sender not in self.index and link.newest < needed and not self.over(sender, link):
+                    return f"record {needed} of UAV {sender}"
+        self.complete = needed
+        if tells:
+            window = _AHEAD - (-self.timing.latency_us // self.timing.exchange_us)
+            awaited = tick // self.timing.exchange_every - window
+            for hearer, heard in self.acknowledged.items():
+                if heard < awaited and hearer not in self.gate.gone:
+                    return f"UAV {hearer} to acknowledge record {awaited}"
+        return ""
+
+    def over(self, sender: int, link: _Link) -> bool:
+        """Whether nothing more will come from a sender."""
+        return link.ended or sender in self.gate.gone
 
     def heard(self) -> int:
         """Sequence number up to which everything has been received from all outside this process."""
@@ -408,7 +428,7 @@ class Crew:
             link.newest
             for i in _those(self.alive)
             for sender, link in self.links[i].items()
-            if sender not in self.index and not link.ended and sender not in self.gate.gone
+            if sender not in self.index and not self.over(sender, link)
         ]
         return min(newest, default=_NOTHING_MORE)
 

@@ -1,0 +1,30 @@
+"""What people touch. `Run` opens a recorded flight; `load`, `resolve` and `simulate` fly one from a program."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission, resolve
+    from ftcc.groundside.run import Run, RunError
+    from ftcc.groundside.scenario import Scenario, ScenarioError, load
+
+__all__ = ["Mission", "Run", "RunError", "Scenario", "ScenarioError", "load", "resolve"]
+
+_HOMES = {
+    "Mission": "mission",
+    "resolve": "mission",
+    "Run": "run",
+    "RunError": "run",
+    "Scenario": "scenario",
+    "ScenarioError": "scenario",
+    "load": "scenario",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use: a child process or ``ftcc list`` must not pay for pydantic and Arrow."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.groundside.metrics import METRICS, Signals, check_expression, evaluated, window_of
+from ftcc.groundside.metrics import DERIVED, METRICS, Signals, check_expression, evaluated, names_in, window_of
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 
@@ -105,6 +105,7 @@ def _uavs_of(claim: Claim, graph: Graph) -> tuple[int, ...]:
 def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) -> list[str]:
     """What is wrong with the claims of a scenario."""
     problems = []
+    led = bool(graph.leaders) and set(graph.followers) <= graph.reached_from(graph.leaders)
     for n, claim in enumerate(claims):
         where = f"claims.{n} ({claim.name})"
         if claim.metric not in METRICS:
@@ -114,6 +115,9 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
             check_expression(claim.signal, columns)
         except ValueError as error:
             problems.append(f"{where}: signal {error}")
+        else:
+            if names_in(claim.signal) & set(DERIVED) and not led:
+                problems.append(f"{where}: signal {claim.signal!r} needs leaders that reach every follower")
         strangers = sorted(set(_uavs_of(claim, graph)) - set(graph.uavs))
         if strangers:
             problems.append(f"{where}: uavs {', '.join(map(str, strangers))} do not exist")
@@ -136,9 +140,11 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
 def evaluate(signals: Signals, claims: Iterable[Claim], case: str, graph: Graph) -> list[Result]:
     """Hold all claims of ``case`` against a recording.
 
-    A window is covered if the recording of any UAV reaches its end; a claim about a UAV that was lost before then fails.
+    A window is covered if the recording of any UAV reaches its end; a claim about a UAV lost before then fails.
     """
-    end = max((float(signals.column("t", uav)[-1]) for uav in signals.uavs if len(signals.column("t", uav))), default=-1.0)
+    end = max(
+        (float(signals.column("t", uav)[-1]) for uav in signals.uavs if len(signals.column("t", uav))), default=-1.0
+    )
     return [_result(signals, claim, case, graph, end) for claim in claims if case in claim.expected]
 
 

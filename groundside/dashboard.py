@@ -27,10 +27,13 @@ if TYPE_CHECKING:
 __all__ = ["Dashboard"]
 
 _APPLICATION = "ftcc"
-_TO_VIEWER = 0.1
+_TO_VIEWER = 0.2
 """Longest wait of logged data in the process, on their way to the viewer, s."""
-_TO_FILE = 1.0
-"""The same on their way to the recording, s: what a killed run loses. Few large pieces make a small file."""
+_TO_FILE = 2.0
+"""The same on their way to the recording, s: what a killed run loses.
+
+Few large pieces make a small file and a small index of it, which stays in memory until the file is closed.
+"""
 
 
 class Dashboard:
@@ -111,7 +114,8 @@ class Dashboard:
         entries: list[Entry] = []
         if self._scene is None or self._plots is None:
             entries += self._begin(snapshot)
-        assert self._scene is not None and self._plots is not None
+        assert self._scene is not None
+        assert self._plots is not None
         entries += self._scene.draw(snapshot)
         entries += self._plots.draw(snapshot)
         entries += self._own_events()
@@ -164,8 +168,7 @@ class Dashboard:
         import rerun as rr
 
         batches = rr.ChunkBatcherConfig(flush_tick=hold)
-        stream = rr.RecordingStream(_APPLICATION, recording_id=self._id, batcher_config=batches)
-        return stream
+        return rr.RecordingStream(_APPLICATION, recording_id=self._id, batcher_config=batches)
 
     def _to_viewer(self, address: str) -> rr.RecordingStream:
         import rerun as rr
@@ -195,10 +198,10 @@ def _blueprint(scene: Scene, plots: Plots) -> rrb.Blueprint:
                 scene.view(),
                 rrb.Horizontal(
                     scene.plan_view(),
-                    rrb.Vertical(plots.table_view(), plots.log_view(), row_shares=[5, 3]),
+                    rrb.Vertical(plots.table_view(), plots.log_view(), row_shares=[2, 1]),
                     column_shares=[2, 3],
                 ),
-                row_shares=[5, 4],
+                row_shares=[6, 5],
             ),
             rrb.Vertical(*curves, row_shares=[2] + [1] * (len(curves) - 1)),
             column_shares=[3, 2],

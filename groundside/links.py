@@ -25,7 +25,9 @@ def link_texts(events: Sequence[LinkEventFields]) -> list[tuple[float, int | Non
     for event in events:
         name = _name(event)
         if event.kind == "cut":
-            begin, end = (f"{name} off", f"{name} on again") if event.edge is None else (f"{name} cut", f"{name} restored")
+            begin, end = (
+                (f"{name} off", f"{name} on again") if event.edge is None else (f"{name} cut", f"{name} restored")
+            )
         else:
             changes = ", ".join(f"{key} {value:g}" for key, value in event.changes.items())
             begin, end = f"{name} degraded: {changes}", f"{name} as before"
@@ -55,8 +57,8 @@ def link_changes(
 ) -> dict[int, list[LinkEvent]]:
     """The changes that each UAV applies to its own radio and its in-edges, in order of time.
 
-    Events may overlap: an edge has at every time the base quality with all events of that time applied in the order of the
-    file, and is blocked while any cut lasts.
+    Events may overlap: an edge has at every time the base quality with all events of that time applied in the order
+    of the file, and is blocked while any cut lasts.
     """
     touched: dict[tuple[int, int | None], list[LinkEventFields]] = {}
     for n, event in enumerate(events):
@@ -66,8 +68,8 @@ def link_changes(
         for receiver, sender in edges:
             touched.setdefault((receiver, sender), []).append(event)
     changes: dict[int, list[LinkEvent]] = {}
-    for (uav, sender), own in touched.items():
-        start = base if sender is not None else Channel()
+    for (uav, edge), own in touched.items():
+        start = base if edge is not None else Channel()
         before = start
         for at in sorted({e.at for e in own} | {e.until for e in own if e.until is not None}):
             quality = start
@@ -75,6 +77,6 @@ def link_changes(
                 if event.at <= at < (math.inf if event.until is None else event.until):
                     quality = quality._replace(**({"blocked": 1.0} if event.kind == "cut" else event.changes))
             if quality != before:
-                changes.setdefault(uav, []).append(LinkEvent(round(at * 1e6), sender, quality))
+                changes.setdefault(uav, []).append(LinkEvent(round(at * 1e6), edge, quality))
                 before = quality
     return {uav: sorted(own, key=lambda change: change.at_us) for uav, own in changes.items()}

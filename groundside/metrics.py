@@ -1,8 +1,8 @@
 """Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
 
 An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``. Beside the recorded columns there
-are, for followers of a graph with leaders, ``z_d`` (the altitude that its hull weights give it) and ``hull_distance`` (how
-far it is above or below all leaders).
+are, for followers of a graph with leaders, ``z_d`` (the altitude that its hull weights give it) and ``hull_distance``
+(how far it is above or below all leaders).
 """
 
 from __future__ import annotations
@@ -123,9 +123,11 @@ def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Arra
         if isinstance(node, ast.Name):
             return values[node.id]
         assert isinstance(node, ast.Constant)
-        return node.value
+        return np.float64(node.value)
 
-    return np.broadcast_to(np.asarray(value(_parsed(expression)), np.float64), signals.column("t", uav).shape)
+    with np.errstate(all="ignore"):
+        result = np.asarray(value(_parsed(expression)), np.float64)
+    return np.broadcast_to(result, signals.column("t", uav).shape)
 
 
 def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
@@ -134,12 +136,12 @@ def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
     altitudes = _leaders_altitudes(signals, graph, signals.column("t", uav))
     if name == "hull_distance":
         z = signals.column("z", uav)
-        return np.maximum(np.maximum(altitudes.min(axis=0) - z, z - altitudes.max(axis=0)), 0.0)
+        outside: Array = np.maximum(np.maximum(altitudes.min(axis=0) - z, z - altitudes.max(axis=0)), 0.0)
+        return outside
     if uav not in graph.followers:
         return np.full(altitudes.shape[1], np.nan)
-    weights: Array = graph.hull_weights[graph.followers.index(uav)]
-    # Summed leader by leader: the same bits on every machine.
-    return sum((w * z for w, z in zip(weights, altitudes, strict=True)), np.zeros(altitudes.shape[1]))
+    place: Array = graph.hull_weights[graph.followers.index(uav)] @ altitudes
+    return place
 
 
 def _leaders_altitudes(signals: Signals, graph: Graph, t: Array) -> Array:

@@ -6,12 +6,12 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.airside.scheme import Quantity
-from ftcc.groundside.scene import GRAY, colors, faults, name
+from ftcc.groundside.scene import GRAY, Color, colors, faults, name
 from ftcc.groundside.snapshot import Event, Snapshot
 from ftcc.groundside.viewer import Entry
 
@@ -66,12 +66,13 @@ class Plots:
     def log_view(self) -> rrb.TextLogView:
         """Events, by simulated time."""
         # The time stands in the text: Rerun's column for it is too narrow to read.
-        columns = rrb.TextLogColumns(timeline_columns=[], text_log_columns=["loglevel", "body"])
+        clock = TimelineColumn("t", visible=False)
+        columns = rrb.TextLogColumns(timeline_columns=[clock], text_log_columns=["loglevel", "body"])
         return rrb.TextLogView(origin="/events", name="Events", columns=columns)
 
     def table_view(self) -> rrb.TextDocumentView:
         """The swarm as a table."""
-        return rrb.TextDocumentView(origin="/swarm", name="Swarm")
+        return rrb.TextDocumentView(origin="/swarm", name="Swarm", titlebar=False)
 
     def static(self) -> list[Entry]:
         """Names, colours and widths of all series."""
@@ -79,26 +80,22 @@ class Plots:
             Entry(
                 "/plots/altitude/uavs",
                 None,
-                self._style(self._uavs, widths=[2.5 if uav in self._leaders else 1.5 for uav in self._uavs]),
+                _style(self._curves(self._uavs, widths=[2.5 if uav in self._leaders else 1.5 for uav in self._uavs])),
             )
         ]
         for error in self._errors:
-            entries.append(Entry(f"/plots/errors/{error.name}/uavs", None, self._style(self._followers)))
+            curves = self._curves(self._followers)
             if isinstance(error.bound, str):
-                names = [f"{name(uav)} {side} bound" for side in ("upper", "lower") for uav in self._followers]
-                tints = [self._colors[uav] for uav in self._followers] * 2
-                style = rr.SeriesLines(names=names, colors=tints, widths=[0.7] * len(names))
-                entries.append(Entry(f"/plots/errors/{error.name}/bounds", None, style))
+                curves += self._curves(self._followers, " upper bound", [0.7] * len(self._followers))
+                curves += self._curves(self._followers, " lower bound", [0.7] * len(self._followers))
             elif error.bound is not None:
-                entries.append(Entry(f"/plots/errors/{error.name}/bounds", None, _lines("upper bound", "lower bound")))
+                curves += [("upper bound", GRAY, 1.0), ("lower bound", GRAY, 1.0)]
+            entries.append(Entry(f"/plots/errors/{error.name}", None, _style(curves)))
         for actuator in self._limits:
-            path = f"/plots/actuators/{actuator}"
-            commanded = self._style(self._followers, " commanded", [0.7] * len(self._followers))
-            entries += [
-                Entry(f"{path}/acting", None, self._style(self._followers)),
-                Entry(f"{path}/commanded", None, commanded),
-                Entry(f"{path}/limits", None, _lines("lower limit", "upper limit")),
-            ]
+            curves = self._curves(self._followers)
+            curves += self._curves(self._followers, " commanded", [0.7] * len(self._followers))
+            curves += [("lower limit", GRAY, 1.0), ("upper limit", GRAY, 1.0)]
+            entries.append(Entry(f"/plots/actuators/{actuator}", None, _style(curves)))
         return entries
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
@@ -111,22 +108,17 @@ class Plots:
         if edge and all(map(math.isfinite, edge)):
             entries.append(Entry("/plots/altitude/hull", t, _band(min(edge), max(edge))))
         for error in self._errors:
-            path = f"/plots/errors/{error.name}"
-            entries.append(Entry(f"{path}/uavs", t, rr.Scalars(self._signal(snapshot, error.name))))
+            values = self._signal(snapshot, error.name)
             if isinstance(error.bound, str):
-                bound = np.abs(self._signal(snapshot, error.bound))
-                entries.append(Entry(f"{path}/bounds", t, rr.Scalars(np.concatenate([bound, -bound]))))
+                bounds = [abs(bound) for bound in self._signal(snapshot, error.bound)]
+                values += bounds + [-bound for bound in bounds]
             elif error.bound is not None:
-                entries.append(Entry(f"{path}/bounds", t, rr.Scalars([error.bound, -error.bound])))
+                values += [error.bound, -error.bound]
+            entries.append(Entry(f"/plots/errors/{error.name}", t, rr.Scalars(values)))
         for actuator, limit in self._limits.items():
-            path = f"/plots/actuators/{actuator}"
             acting = [uavs[uav].acting.get(actuator, math.nan) if uav in uavs else math.nan for uav in self._followers]
             wanted = [uavs[uav].command.get(actuator, math.nan) if uav in uavs else math.nan for uav in self._followers]
-            entries += [
-                Entry(f"{path}/acting", t, rr.Scalars(acting)),
-                Entry(f"{path}/commanded", t, rr.Scalars(wanted)),
-                Entry(f"{path}/limits", t, rr.Scalars(limit)),
-            ]
+            entries.append(Entry(f"/plots/actuators/{actuator}", t, rr.Scalars([*acting, *wanted, *limit])))
         if self._table_in == 0:
             entries.append(Entry("/swarm", t, rr.TextDocument(self._table(snapshot), media_type="text/markdown")))
         self._table_in = (self._table_in + 1) % _TABLE_EVERY
@@ -136,14 +128,11 @@ class Plots:
         uavs = snapshot.uavs
         return [uavs[uav].signals.get(signal, math.nan) if uav in uavs else math.nan for uav in self._followers]
 
-    def _style(
+    def _curves(
         self, uavs: Sequence[int], suffix: str = "", widths: Sequence[float] | None = None
-    ) -> rr.SeriesLines:
-        return rr.SeriesLines(
-            names=[f"{name(uav)}{suffix}" for uav in uavs],
-            colors=[self._colors[uav] for uav in uavs],
-            widths=widths or [1.5] * len(uavs),
-        )
+    ) -> list[tuple[str, Color, float]]:
+        widths = widths or [1.5] * len(uavs)
+        return [(f"{name(uav)}{suffix}", self._colors[uav], width) for uav, width in zip(uavs, widths, strict=True)]
 
     def _table(self, snapshot: Snapshot) -> str:
         rows = [
@@ -200,8 +189,9 @@ def _view(origin: str, title: str) -> rrb.View:
     )
 
 
-def _lines(*names: str) -> rr.SeriesLines:
-    return rr.SeriesLines(names=list(names), colors=[GRAY] * len(names), widths=[1.0] * len(names))
+def _style(curves: Sequence[tuple[str, Color, float]]) -> rr.SeriesLines:
+    names, tints, widths = zip(*curves, strict=True)
+    return rr.SeriesLines(names=names, colors=tints, widths=widths)
 
 
 def _band(low: float, high: float) -> rr.Measurements:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.groundside.errors import UserError
 from ftcc.link.recording import Column, arrow_schema, read_events, read_part
 from ftcc.sim.plant import TRUTH
 
@@ -30,7 +31,7 @@ LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
 """The first columns of ``signals.parquet``; the scheme's SIGNALS follow."""
 
 
-class RunError(ValueError):
+class RunError(UserError):
     """A folder that is no run, or a run that cannot be read."""
 
 
@@ -126,8 +127,17 @@ class Run:
 
     @property
     def lost(self) -> dict[int, str]:
-        """UAVs that did not end the flight, and why."""
-        return {e["uav"]: e["text"] for e in self.events if e.get("kind") == "lost" and e.get("uav") is not None}
+        """UAVs that did not end the flight, and what the log says of them."""
+        found: dict[int, str] = {}
+        for event in self.events:
+            if event["severity"] == "error" and event["uav"] is not None:
+                found.setdefault(int(event["uav"]), str(event["text"]))
+        return found
+
+    @property
+    def end(self) -> float:
+        """Time of the last recorded row, s."""
+        return max(float(self.column("t", uav)[-1]) for uav in self.uavs)
 
     @property
     def file(self) -> Path:

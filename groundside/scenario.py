@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from ftcc.groundside.errors import UserError
 from ftcc.groundside.schema import AirframeSheet, Plan, fields_of
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
@@ -27,7 +28,7 @@ _VARIANT_KEYS = ("title", "forms")
 M = TypeVar("M", bound=BaseModel)
 
 
-class ScenarioError(ValueError):
+class ScenarioError(UserError):
     """A scenario that cannot fly: every problem with file, field, value and what is allowed."""
 
     def __init__(self, file: str | Path, problems: Sequence[str]) -> None:
@@ -38,7 +39,7 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scenario with its form and variants chosen, every field checked on its own; `mission.resolve` checks the rest."""
+    """A scenario with form and variants chosen, every field checked on its own; `mission.resolve` checks the rest."""
 
     name: str
     file: Path
@@ -48,6 +49,8 @@ class Scenario:
     plan: Plan
     document: dict[str, Any]
     """What ``plan`` was made from, as it would stand in a file."""
+    source: dict[str, Any]
+    """The whole file, with all its forms and variants."""
 
     @property
     def case(self) -> str:
@@ -129,7 +132,8 @@ def load(
     flown = "flown" in document
     if flown and (variants or form not in (None, known_forms[0])):
         raise ScenarioError(
-            path, [f"is the scenario of a flight in form {known_forms[0]}: choose forms and variants from the original file"]
+            path,
+            [f"is the scenario of a flight in form {known_forms[0]}: choose forms and variants from the original file"],
         )
     chosen = form or known_forms[0]
     if chosen not in known_forms:
@@ -155,7 +159,9 @@ def load(
     if plan.flown is not None:
         name, ordered = plan.flown.name, tuple(plan.flown.variants)
         settings = (*plan.flown.settings, *settings)
-    return Scenario(name, path, chosen, ordered, tuple(settings), plan, merged)
+    else:
+        _check_cases(path, plan, known_forms, list(known_variants))
+    return Scenario(name, path, chosen, ordered, tuple(settings), plan, merged, document)
 
 
 def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet:
@@ -165,7 +171,10 @@ def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet:
     if not path.is_file():
         raise ScenarioError(
             scenario_file,
-            [f"airframe = {name_or_path!r}: there is no such sheet; there are {', '.join(sheets)}, or give a TOML file"],
+            [
+                f"airframe = {name_or_path!r}: there is no such sheet; "
+                f"there are {', '.join(sheets)}, or give a TOML file"
+            ],
         )
     return validate(AirframeSheet, read(path), path)
 
@@ -184,6 +193,21 @@ def _variant(path: Path, name: str, block: dict[str, Any], form: str, forms: Seq
         raise ScenarioError(path, [f"variant = {name}: flies in form {', '.join(allowed)}, not in {form}"])
     changes = {key: value for key, value in block.items() if key not in (*_VARIANT_KEYS, *forms)}
     return _merged(changes, block.get(form, {}))
+
+
+def _check_cases(path: Path, plan: Plan, forms: Sequence[str], variants: Sequence[str]) -> None:
+    """Refuse claims for cases that nobody can ask for: a typing error must not make a claim disappear."""
+    problems = []
+    for n, claim in enumerate(plan.claims):
+        for case in claim.expected:
+            form, *names = case.split("+")
+            if form not in forms or names != [name for name in variants if name in names]:
+                problems.append(
+                    f"claims.{n}.expected: case {case!r} ({claim.name}) must be a form ({', '.join(forms)}), "
+                    f"followed by variants that the file declares, each after a +, in the file's order"
+                )
+    if problems:
+        raise ScenarioError(path, problems)
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from ftcc.link.graph import Graph
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 
-__all__ = ["CUT", "FRESH", "GRAY", "Scene", "STALE", "TRAIL", "colors", "faults", "name"]
+__all__ = ["CUT", "FRESH", "GRAY", "STALE", "TRAIL", "Color", "Scene", "colors", "faults", "name"]
 
 Color = tuple[int, int, int]
 
@@ -103,21 +103,24 @@ class Scene:
         self._edges = sorted((sender, receiver) for receiver, sender in graph.weights)
         self._index = {uav: i for i, uav in enumerate(self._uavs)}
         self._ends = np.array([(self._index[j], self._index[i]) for j, i in self._edges], dtype=int).reshape(-1, 2)
-        self._lanes = np.zeros(len(self._uavs))
+        self._lanes: NDArray[np.float64] = np.zeros(len(self._uavs))
         self._positions = np.full((len(self._uavs), 3), np.nan)
         self._place(first)
         if len(self._uavs) > 1 and np.nanmax(self._positions[:, 0]) - np.nanmin(self._positions[:, 0]) < 1.0:
-            self._lanes = LANE * (np.arange(len(self._uavs)) - 0.5 * (len(self._uavs) - 1))
+            self._lanes += LANE * (np.arange(len(self._uavs)) - 0.5 * (len(self._uavs) - 1))
             self._place(first)
         seen = self._positions[np.isfinite(self._positions[:, 0])]
-        self._centre = seen.mean(axis=0) if len(seen) else np.zeros(3)
+        self._centre: NDArray[np.float64] = seen.mean(axis=0) if len(seen) else np.zeros(3)
         self._radius = max(30.0, float(np.linalg.norm(seen - self._centre, axis=1).max(initial=0.0)))
         apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[~np.eye(len(seen), dtype=bool)]
         room = min(0.9 * float(apart.min(initial=np.inf)), 0.3 * self._radius)
         self._scale = max(1, round(room / _SPAN))
         self._plan = _plan(graph, self._leaders)
-        self._labels: list[str] = []
-        self._troubles: list[str] | None = None
+        plan = np.array([self._plan[uav] for uav in self._uavs])
+        self._plan_origins, self._plan_vectors = _arrows(plan[self._ends[:, 0]], plan[self._ends[:, 1]], 0.16, 0.035)
+        self._labels: dict[int, str] = {}
+        self._tints: list[Color] = []
+        self._troubles: list[str] = []
         self._message = np.zeros(len(STATE_MESSAGE))
 
     @property
@@ -154,7 +157,7 @@ class Scene:
         """Who hears whom."""
         return rrb.Spatial2DView(
             origin="/graph",
-            name="Who hears whom (gray fresh, amber stale, red cut)",
+            name="Links (gray fresh, amber stale, red cut)",
             visual_bounds=rrb.VisualBounds2D(x_range=(-1.9, 1.9), y_range=(-1.9, 1.9)),
         )
 
@@ -164,28 +167,33 @@ class Scene:
         entries = [Entry("/world", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
         vertices, normals = _airframe(self._scale)
         for uav in self._uavs:
-            shape = rr.Mesh3D(
-                vertex_positions=vertices, vertex_normals=normals, albedo_factor=self._colors[uav]
-            )
+            shape = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=self._colors[uav])
             entries.append(Entry(f"/world/uav/{uav}/airframe", None, shape))
+            above = rr.Points3D(
+                (0.0, 0.0, -0.55 * self._scale * _SPAN), colors=self._colors[uav], radii=rr.Radius.ui_points(0.5)
+            )
+            entries.append(Entry(f"/world/uav/{uav}/label", None, above))
         width = rr.Radius.ui_points(0.75)
         entries += [
             Entry("/world/trails", None, rr.LineStrips3D.from_fields(colors=tints, radii=width)),
-            Entry("/world/labels", None, rr.Points3D.from_fields(colors=tints, radii=rr.Radius.ui_points(0.5))),
             Entry("/world/hull", None, rr.LineStrips3D.from_fields(colors=GRAY, radii=rr.Radius.ui_points(1.0))),
         ]
         return entries + self._static_plan(tints)
 
     def _static_plan(self, tints: list[Color]) -> list[Entry]:
         nodes = rr.Points2D(
-            np.array([self._plan[uav] for uav in self._uavs]),
+            [self._plan[uav] for uav in self._uavs],
             colors=tints,
             radii=rr.Radius.ui_points(7.0),
-            labels=[name(uav) + (" leader" if uav in self._leaders else "") for uav in self._uavs],
+            labels=[self._name(uav) for uav in self._uavs],
             show_labels=True,
             draw_order=20.0,
         )
-        return [Entry("/graph/uavs", None, nodes)]
+        entries = [Entry("/graph/uavs", None, nodes)]
+        if self._edges:
+            arrows = rr.Arrows2D.from_fields(origins=self._plan_origins, vectors=self._plan_vectors)
+            entries.append(Entry("/graph/links", None, arrows))
+        return entries
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """Everything that moves."""
@@ -203,12 +211,12 @@ class Scene:
                 entries.append(Entry(f"/world/uav/{uav}", t, pose))
         before = np.where(np.isfinite(before), before, after)
         entries.append(Entry("/world/trails", t, rr.LineStrips3D.from_fields(strips=np.stack([before, after], axis=1))))
-        above = after + (0.0, 0.0, 0.55 * self._scale * _SPAN)
-        entries.append(Entry("/world/labels", t, rr.Points3D.from_fields(positions=above)))
-        labels = [self._label(uav, snapshot) for uav in self._uavs]
-        if labels != self._labels:
-            self._labels = labels
-            entries.append(Entry("/world/labels", t, rr.Points3D.from_fields(labels=labels, show_labels=True)))
+        for uav in self._uavs:
+            label = self._label(uav, snapshot)
+            if label != self._labels.get(uav):
+                self._labels[uav] = label
+                text = rr.Points3D.from_fields(labels=label, show_labels=True)
+                entries.append(Entry(f"/world/uav/{uav}/label", t, text))
         entries += self._hull(t)
         entries += self._links(snapshot)
         return entries
@@ -223,13 +231,15 @@ class Scene:
                 self._positions[i] = here
 
     def _attitude(self, state: UavState) -> rr.Quaternion:
-        truth = np.array([state.truth.get(field, 0.0) for field in TRUTH])
-        encode_state(np.nan_to_num(truth), self._message)
+        encode_state(np.array([state.truth.get(field, 0.0) for field in TRUTH]), self._message)
         w, x, y, z = _times(_NORTH_TO_WORLD, self._message[:4])
         return rr.Quaternion(xyzw=(x, y, z, w))
 
+    def _name(self, uav: int) -> str:
+        return name(uav) + (" leader" if uav in self._leaders else "")
+
     def _label(self, uav: int, snapshot: Snapshot) -> str:
-        label = name(uav) + (" leader" if uav in self._leaders else "")
+        label = self._name(uav)
         state = snapshot.uavs.get(uav)
         if state is None:
             return f"{label}: not heard"
@@ -253,25 +263,28 @@ class Scene:
         if not self._edges:
             return []
         t = snapshot.t
-        links = [_link(snapshot.uavs, sender, receiver) for sender, receiver in self._edges]
-        tints = np.array([self._color(link) for link in links], dtype=np.uint8)
-        widths = rr.Radius.ui_points([1.0 if tuple(tint) == FRESH else 2.0 for tint in tints])
         start, end = self._positions[self._ends[:, 0]], self._positions[self._ends[:, 1]]
         gap = 0.5 * self._scale * _SPAN
         origins, vectors = _arrows(start, end, gap, 0.12 * gap)
-        arrows = rr.Arrows3D(origins=origins, vectors=vectors, colors=tints, radii=widths)
-        plan = np.array([self._plan[uav] for uav in self._uavs])
-        origins, vectors = _arrows(plan[self._ends[:, 0]], plan[self._ends[:, 1]], 0.16, 0.035)
-        plan_arrows = rr.Arrows2D(origins=origins, vectors=vectors, colors=tints, radii=widths)
-        entries = [Entry("/world/links", t, arrows), Entry("/graph/links", t, plan_arrows)]
-        troubled = [i for i, tint in enumerate(tints) if tuple(tint) != FRESH]
-        troubles = [_trouble(links[i]) for i in troubled]
+        entries = [Entry("/world/links", t, rr.Arrows3D.from_fields(origins=origins, vectors=vectors))]
+        links = [_link(snapshot.uavs, sender, receiver) for sender, receiver in self._edges]
+        tints = [self._color(link) for link in links]
+        if tints != self._tints:
+            self._tints = tints
+            widths = rr.Radius.ui_points([1.0 if tint == FRESH else 2.0 for tint in tints])
+            entries.append(Entry("/world/links", t, rr.Arrows3D.from_fields(colors=tints, radii=widths)))
+            entries.append(Entry("/graph/links", t, rr.Arrows2D.from_fields(colors=tints, radii=widths)))
+        troubles = ["" if tint == FRESH else _trouble(link) for tint, link in zip(tints, links, strict=True)]
         if troubles != self._troubles:
             self._troubles = troubles
-            # Nearer to the receiver, so that the texts of two directions do not cover each other.
-            where = (origins + 0.6 * vectors)[troubled]
+            which = [i for i, text in enumerate(troubles) if text]
             notes = rr.Points2D(
-                where, labels=troubles, show_labels=True, colors=tints[troubled], radii=rr.Radius.ui_points(1.0)
+                # Nearer to the receiver, so that the texts of two directions do not cover each other.
+                (self._plan_origins + 0.6 * self._plan_vectors)[which],
+                labels=[troubles[i] for i in which],
+                show_labels=True,
+                colors=[tints[i] for i in which],
+                radii=rr.Radius.ui_points(1.0),
             )
             entries.append(Entry("/graph/troubles", t, notes))
         return entries

@@ -115,7 +115,8 @@ class EdgeFields(Strict):
         if self.between is not None:
             a, b = self.between
             return [(a, b), (b, a)]
-        assert self.receiver is not None and self.sender is not None
+        assert self.receiver is not None
+        assert self.sender is not None
         return [(self.receiver, self.sender)]
 
 

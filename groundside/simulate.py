@@ -184,12 +184,10 @@ def simulate(
         if len(flight.t) and t <= flight.t[-1]:
             events.write(t, text, uav)
     for uav, (t, why) in flight.lost.items():
-        events.write(t, f"UAV {uav} lost: {why}", uav, "error", kind="lost")
+        events.write(t, f"UAV {uav} lost: {why}", uav, "error")
     last = float(flight.t[-1]) if len(flight.t) else 0.0
     if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
         events.write(last, "interrupted", severity="warning")
     events.close()
-    write_signals(
-        folder / "signals.parquet", (*COLUMNS, *autopilot_columns(mission.scheme.name)), flight.table()
-    )
+    write_signals(folder / "signals.parquet", (*COLUMNS, *autopilot_columns(mission.scheme.name)), flight.table())
     return Run(folder)

@@ -22,6 +22,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from ftcc.groundside.viewer_page import PageServer
+
 if TYPE_CHECKING:
     import rerun as rr
 
@@ -34,6 +36,10 @@ _START = 20.0
 """Longest wait for the viewer to listen, s."""
 _WAITING = 64
 """Frames that wait for the viewer; at 10 Hz the six seconds that a slow start takes."""
+
+_UNREAD = 50
+"""Frames sent before the viewer must have read them."""
+_BEHIND = "the viewer does not keep up: not everything is shown"
 
 _DIE_WITH_PARENT = """
 import ctypes, os, signal, sys
@@ -113,9 +119,11 @@ class Viewer:
         self._url = f"rerun+http://{_LOOPBACK}:{data_port}/proxy"
         self.address = None
         options = ["--bind", _LOOPBACK, "--port", str(data_port)]
+        inner_port = _free_port()
         if kind == "web":
-            self.address = f"http://{_LOOPBACK}:{page_port}/?url={urllib.parse.quote(self._url, safe='')}"
-            options += ["--serve-web", "--web-viewer-port", str(page_port), "--server-memory-limit", "256MB"]
+            query = f"url={urllib.parse.quote(self._url, safe='')}&hide_welcome_screen"
+            self.address = f"http://{_LOOPBACK}:{page_port}/?{query}"
+            options += ["--serve-web", "--web-viewer-port", str(inner_port), "--server-memory-limit", "256MB"]
         else:
             options += ["--memory-limit", "1GB", "--server-memory-limit", "64MB", "--hide-welcome-screen"]
             options += ["--expect-data-soon"]
@@ -125,8 +133,16 @@ class Viewer:
         self._reported: set[str] = set()
         self._ended = threading.Event()
         self._frames: queue.Queue[list[Entry] | None] = queue.Queue(_WAITING)
-        self._words = tempfile.TemporaryFile()
-        self._process = self._start(options, [data_port, page_port] if kind == "web" else [data_port])
+        self._words = tempfile.TemporaryFile()  # noqa: SIM115 - the viewer writes to it as long as it runs
+        self._page: PageServer | None = None
+        self._process = self._start(options)
+        if kind == "web" and self._process is not None:
+            try:
+                self._page = PageServer(page_port, inner_port, data_port)
+            except OSError as error:
+                self._report(f"no page of the viewer: port {page_port}: {error.strerror}")
+        if self._page is None:
+            self.address = None
         self._thread = threading.Thread(target=self._feed, name="viewer", daemon=True)
         self._thread.start()
 
@@ -137,7 +153,7 @@ class Viewer:
         try:
             self._frames.put_nowait(entries)
         except queue.Full:
-            self._report("the viewer does not keep up: not everything is shown")
+            self._report(_BEHIND)
 
     def take_problem(self) -> str | None:
         """What went wrong since the last call; each kind of problem once."""
@@ -153,6 +169,8 @@ class Viewer:
             pass  # The viewer has stopped reading: nothing that it could be given any more.
         else:
             self._thread.join(1.0)
+        if self._page is not None:
+            self._page.close()
         if self._process is not None:
             self._process.terminate()
             try:
@@ -164,11 +182,11 @@ class Viewer:
         self._thread.join(0.5)
         self._words.close()
 
-    def _start(self, options: list[str], ports: list[int]) -> subprocess.Popen[bytes] | None:
-        for port in ports:
-            if _listening(port):
-                self._report(f"no viewer: port {port} is in use")
-                return None
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes] | None:
+        if _listening(self._data_port):
+            # Rerun would take whoever listens there for the viewer.
+            self._report(f"no viewer: port {self._data_port} is in use")
+            return None
         program = [str(_executable()), *options]
         if sys.platform == "linux":
             program = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid()), *program]
@@ -197,13 +215,28 @@ class Viewer:
         if self.address and self._open_browser and _has_screen():
             webbrowser.open(self.address)
         stream = self._connect(self._url)
+        sent = 0
         while (entries := self._frames.get()) is not None:
+            write(stream, entries)
+            sent += 1
+            if sent % _UNREAD == 0:
+                self._wait_for_reader(stream)
             if self._process.poll() is not None:
                 self._report(f"the viewer ended{self._last_words()}; the flight and its recording go on")
                 break
-            write(stream, entries)
         # Until the viewer has read everything, or has ended.
         stream.disconnect()
+
+    def _wait_for_reader(self, stream: rr.RecordingStream) -> None:
+        """Let nothing pile up in the client, which would hold hundreds of MB before it holds back its caller."""
+        assert self._process is not None
+        while self._process.poll() is None and not self._ended.is_set():
+            try:
+                stream.flush(timeout_sec=1.0)
+                return
+            except RuntimeError:
+                self._report(_BEHIND)
+                time.sleep(0.1)
 
     def _listens(self) -> bool:
         """Wait until the viewer listens; False if it will not."""
@@ -235,7 +268,8 @@ class Viewer:
 def _executable() -> Path:
     """The viewer that the package rerun-sdk brings."""
     found = importlib.util.find_spec("rerun_cli")
-    assert found is not None and found.origin is not None
+    assert found is not None
+    assert found.origin is not None
     folder = Path(found.origin).parent
     bundled = folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun"
     return bundled if bundled.exists() else folder / "rerun"

@@ -1,14 +1,12 @@
 """The mesh: one Zenoh peer per process, linked along the edges of the communication graph and to nobody else.
 
 No multicast, no gossip, no router, loopback unless told otherwise. In real time a ring keeps the newest records; in
-lockstep every record is delivered, in order, and the process that waits for it is woken.
+lockstep a queue keeps every record, in order. Both are polled: a callback per record would cost a thread switch each.
 """
 
 from __future__ import annotations
 
-import collections
 import json
-import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -18,6 +16,8 @@ __all__ = ["Mesh"]
 
 _RING = 16
 """Records kept of each sender in real time."""
+_QUEUE = 1024
+"""Records kept of each sender in lockstep; a sender is held back long before that."""
 
 
 class Mesh:
@@ -49,24 +49,19 @@ class Mesh:
 
         self._zenoh = zenoh
         self._prefix = f"ftcc/{swarm}"
-        self._inbox: collections.deque[bytes] = collections.deque()
         self._awaited = {f"{self._prefix}/{hearer}/hears/{uav}" for uav, hearer in heard_by}
-        self._wake, self._waker = os.pipe()
-        os.set_blocking(self._wake, False)
-        os.set_blocking(self._waker, False)
         self._session = zenoh.open(_configuration(zenoh, listen, connect))
         self._subscribers: list[Any] = []
         self._tokens: list[Any] = []
         hears = list(hears)
         own = list(own)
         for uav in hears:
-            handler: Any = self._deliver if ordered else zenoh.handlers.RingChannel(_RING)
+            handler: Any = zenoh.handlers.FifoChannel(_QUEUE) if ordered else zenoh.handlers.RingChannel(_RING)
             self._subscribers.append(
                 self._session.declare_subscriber(
                     f"{self._prefix}/{uav}/shared", handler, allowed_origin=zenoh.Locality.REMOTE
                 )
             )
-        self._rings = [] if ordered else self._subscribers
         self._publishers = {
             uav: self._session.declare_publisher(
                 f"{self._prefix}/{uav}/shared", congestion_control=zenoh.CongestionControl.BLOCK, express=True
@@ -83,24 +78,9 @@ class Mesh:
                     self._session.liveliness().declare_token(f"{self._prefix}/{uav}/hears/{sender}")
                 )
 
-    def _deliver(self, sample: Any) -> None:
-        self._inbox.append(bytes(sample.payload))
-        self._signal()
-
     def _greeted(self, sample: Any) -> None:
         if sample.kind == self._zenoh.SampleKind.PUT:
             self._awaited.discard(str(sample.key_expr))
-        self._signal()
-
-    def _signal(self) -> None:
-        try:
-            os.write(self._waker, b"!")
-        except BlockingIOError:
-            return  # The pipe is full of wake-ups already.
-
-    def fileno(self) -> int:
-        """For ``select``: readable when something arrived (in lockstep) or a neighbour greeted."""
-        return self._wake
 
     @property
     def ready(self) -> bool:
@@ -117,20 +97,8 @@ class Mesh:
         self._publishers[uav].put(payload)
 
     def receive(self) -> list[bytes]:
-        """The records that have arrived since the last call; in real time the newest of each sender."""
-        self._drain()
-        arrived = [bytes(sample.payload) for ring in self._rings for sample in iter(ring.try_recv, None)]
-        while self._inbox:
-            arrived.append(self._inbox.popleft())
-        return arrived
-
-    def _drain(self) -> None:
-        """Empty the wake-up pipe."""
-        try:
-            while os.read(self._wake, 4096):
-                continue
-        except BlockingIOError:
-            return
+        """The records that have arrived since the last call, those of one sender in order."""
+        return [bytes(sample.payload) for ring in self._subscribers for sample in iter(ring.try_recv, None)]
 
     def close(self) -> None:
         """Drain and leave; closing with records unread would take seconds."""
@@ -138,8 +106,6 @@ class Mesh:
         for declared in (*self._tokens, self._liveliness, *self._subscribers, *self._publishers.values()):
             declared.undeclare()
         self._session.close()
-        os.close(self._wake)
-        os.close(self._waker)
 
 
 def _configuration(zenoh: Any, listen: int | None, connect: Iterable[int]) -> Any:

@@ -84,7 +84,7 @@ class PartWriter:
         self._buffer = np.empty((_ROWS, len(self.columns)))
         self._filled = 0
         self._flushed = time.monotonic()
-        self._file = open(self.path, "wb", buffering=0)
+        self._file = self.path.open("wb", buffering=0)
         self._stream = pa.ipc.new_stream(self._file, self._schema)
 
     def row(self, values: Sequence[float]) -> None:
@@ -122,7 +122,7 @@ class PartWriter:
 
 
 def read_part(path: Path) -> Any:
-    """The part as a ``pyarrow.Table``, up to the last batch that was written completely; None if there is not even a schema."""
+    """The part as a ``pyarrow.Table`` up to the last batch that is whole; None if there is not even a schema."""
     import pyarrow as pa
 
     batches = []
@@ -147,14 +147,12 @@ class EventLog:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        new = not self.path.exists()
-        self._file = open(self.path, "a", encoding="utf-8", buffering=1)
-        if new:
-            self._file.write(json.dumps({"schema": SCHEMA_VERSION}) + "\n")
+        self._file = self.path.open("a", encoding="utf-8", buffering=1)
 
     def write(self, t: float, text: str, uav: int | None = None, severity: str = "info", **more: Any) -> None:
         """Append an event at simulated time ``t`` (s); ``severity`` is "info", "warning" or "error"."""
-        event = {"t": t, "uav": uav, "severity": severity, "text": text, "wall": round(time.time(), 3), **more}
+        event = {"schema": SCHEMA_VERSION, "t": t, "uav": uav, "severity": severity, "text": text}
+        event |= {"wall": round(time.time(), 3), **more}
         self._file.write(json.dumps(event) + "\n")
 
     def close(self) -> None:

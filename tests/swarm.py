@@ -115,6 +115,9 @@ def timing(form: str, seconds: float, seed: int = 1) -> Timing:
     return Timing(1000, 1000, 0, 1000, round(seconds * 1000), 1, seed)
 
 
+PERFECT, QUIET = Channel(), noise()
+
+
 @dataclass
 class Swarm:
     """The reference swarm before or in flight."""
@@ -127,8 +130,8 @@ class Swarm:
     start: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     """Initial (V, x, z, gamma, theta, q) of single followers."""
     gains: Mapping[str, float] = field(default_factory=dict)
-    channel: Channel = Channel()
-    noise: tuple[float, ...] = noise()
+    channel: Channel = PERFECT
+    noise: tuple[float, ...] = QUIET
     faults: Mapping[int, tuple[Fault, ...]] = field(default_factory=dict)
     disturbances: tuple[Disturbance, ...] = ()
     link_events: Mapping[int, tuple[LinkEvent, ...]] = field(default_factory=dict)

@@ -67,6 +67,7 @@ class Gains(NamedTuple):
     rate_filter: Annotated[float, Q("T_a", "s", "low-pass of the acceleration sent, 0: off (not in paper)", 0.0)]
     V_start: Annotated[float, Q("V_start", "m/s", "reference before the first neighbour is heard", 30.0)]
     z_start: Annotated[float, Q("z_start", "m", "reference before the first neighbour is heard", 1000.0)]
+    z_rate_start: Annotated[float, Q("z_rate_start", "m/s", "and its rate", 0.0)]
     in_flight: Annotated[float, Q("in_flight", "-", "1: before the first neighbour is heard, the own speed and altitude", 0.0)]
 
 
@@ -92,23 +93,35 @@ class State(NamedTuple):
     V_rate_f: Annotated[float, Q("a_f", "m/s^2", "low-pass of the acceleration sent")]
     V_before: Annotated[float, Q("V_before", "m/s", "airspeed at the tick before")]
     V_rate_before: Annotated[float, Q("a_before", "m/s^2", "modelled acceleration at the tick before")]
+    begun: Annotated[float, Q("begun", "-", "0 before the first tick, 1 until a neighbour is heard, then 2")]
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one evaluation of the law shows."""
+    """One evaluation of the law: commands first, then virtual controls, errors and the states' rates."""
 
     thrust: float
     elevator: float
-    V_rate: float
-    V_id: float
-    z_id: float
+    thrust_wanted: float
+    elevator_wanted: float
     S1: float
     S2: float
     d1_hat: float
     d2_hat: float
     lumped_hat: float
-    thrust_wanted: float
-    elevator_wanted: float
+    gamma_bar: float
+    theta_bar: float
+    x1_rate: float
+    x2_rate: float
+    x3_rate: float
+    gamma_d_rate: float
+    theta_d_rate: float
+    q_d_rate: float
+    xi1_rate: float
+    xi2_rate: float
+    known_V_rate: float
+    V_rate: float
+    V_id: float
+    z_id: float
 
 
 SHARED = {
@@ -148,7 +161,7 @@ COMMANDS = ("thrust", "elevator")
 PLANT = "longitudinal"
 _GUARDS = {"gamma_limit": 0.3, "alpha_limit": 0.25, "q_limit": 2.0}
 FORMS = {
-    "monograph": {},
+    "monograph": {"accelerometer": 1.0},
     "flight": _GUARDS | {"k21": 4.0, "filter_frequency": 2.0, "lead": 100.0},
 }
 SWITCHES = {
@@ -162,32 +175,6 @@ SWITCHES = {
 
 _LEAST_AIRSPEED = 5.0
 """Airspeed guard in every division, m/s."""
-
-
-class _Evaluation(NamedTuple):
-    """One evaluation of the law: commands, virtual controls and what the rates of the states need."""
-
-    thrust: float
-    elevator: float
-    thrust_wanted: float
-    elevator_wanted: float
-    gamma_bar: float
-    theta_bar: float
-    q_bar: float
-    d1_hat: float
-    d2_hat: float
-    lumped_hat: float
-    x1_rate: float
-    x2_rate: float
-    x3_rate: float
-    gamma_d_rate: float
-    theta_d_rate: float
-    q_d_rate: float
-    xi1_rate: float
-    xi2_rate: float
-    S1: float
-    S2: float
-    V_rate: float
 
 
 @compiled
@@ -232,7 +219,7 @@ def _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains):  # type: igno
     elevator = clip(elevator_wanted, model.elevator_min, model.elevator_max)
 
     acting_thrust, acting_elevator = thrust, elevator
-    if gains.lead > 0.0:
+    if gains.lead > 0.0 and model.lag > 0.0:
         acting_thrust, acting_elevator = s.thrust, s.elevator
     return _Evaluation(
         thrust,
@@ -260,7 +247,7 @@ def _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains):  # type: igno
 
 
 @compiled
-def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d):  # type: ignore[no-untyped-def]
+def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d, begun):  # type: ignore[no-untyped-def]
     return State(
         x1=0.0,
         x2=0.0,
@@ -281,47 +268,52 @@ def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d):  # type: ignore[no-un
         V_rate_f=0.0,
         V_before=own.V,
         V_rate_before=0.0,
+        begun=begun,
     )
 
 
 @compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
-    """State at the first tick: the reference at the neighbours' mean, the commands' filters at what they filter."""
-    V, V_rate, weights = weighted_average(heard, 0, gains.oldest)
-    z, z_rate, _ = weighted_average(heard, 2, gains.oldest)
-    if weights == 0.0:
-        V, z = gains.V_start, gains.z_start
-        if gains.in_flight > 0.0:
-            V, z = own.V, own.z
-    gamma_d, theta_d = 0.0, 0.0
-    # The pitch command depends on the filtered flight-path command.
-    for _ in range(2):
-        s = _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d)
-        law = _evaluate(s, own, V, V_rate, z, z_rate, model, gains)
-        gamma_d, theta_d = law.gamma_bar, law.theta_bar
-    return _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d)
+    """State before the first tick; the first step sets the filters."""
+    V, z = gains.V_start, gains.z_start
+    if gains.in_flight > 0.0:
+        V, z = own.V, own.z
+    return _initial(own, V, 0.0, z, 0.0, 0.0, 0.0, 0.0)
 
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
-    """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output."""
+    """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output.
+
+    The law begins at the first tick, and anew at the first one with a neighbour: the reference filter at the neighbours'
+    mean, the commands' filters at what they filter.
+    """
     s = state
     # Nearest-neighbour reference (4.10), (4.11).
-    V_d, V_d_rate, weights = weighted_average(heard, 0, gains.oldest)
-    z_d, z_d_rate, _ = weighted_average(heard, 2, gains.oldest)
+    V_id, V_id_rate, weights = weighted_average(heard, 0, gains.oldest)
+    z_id, z_id_rate, _ = weighted_average(heard, 2, gains.oldest)
     if weights == 0.0:
-        V_d, z_d = s.V_mean, s.z_mean
-    V_id, z_id = V_d, z_d
-    if gains.filter_frequency > 0.0:
+        V_id, z_id = s.V_mean, s.z_mean
+        z_id_rate = gains.z_rate_start if s.begun < 2.0 else 0.0
+    begun = 2.0 if weights > 0.0 or s.begun == 2.0 else 1.0
+    beginning = s.begun == 0.0
+    V_d, V_d_rate, z_d, z_d_rate = V_id, V_id_rate, z_id, z_id_rate
+    if gains.filter_frequency > 0.0 and not beginning:
         w, damping = gains.filter_frequency, gains.filter_damping
-        V_d, V_d_rate = second_order_reference_step(s.V_r, s.V_r_rate, V_d, V_d_rate, w, damping, dt)
-        z_d, z_d_rate = second_order_reference_step(s.z_r, s.z_r_rate, z_d, z_d_rate, w, damping, dt)
-    law = _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains)
+        V_d, V_d_rate = second_order_reference_step(s.V_r, s.V_r_rate, V_id, V_id_rate, w, damping, dt)
+        z_d, z_d_rate = second_order_reference_step(s.z_r, s.z_r_rate, z_id, z_id_rate, w, damping, dt)
+    gamma_d, theta_d = 0.0, 0.0
+    # Beginning takes three passes: the pitch command depends on the filtered flight-path command.
+    for _ in range(3 if beginning else 1):
+        if beginning:
+            s = _initial(own, V_id, V_id_rate, z_id, z_id_rate, gamma_d, theta_d, begun)
+        law = _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains)
+        gamma_d, theta_d = law.gamma_bar, law.theta_bar
 
     # The command that moves the lagging actuators, from where they will be when it comes into force.
     thrust, elevator = law.thrust, law.elevator
     thrust_position, elevator_position = s.thrust, s.elevator
-    if gains.lead > 0.0:
+    if gains.lead > 0.0 and model.lag > 0.0:
         thrust_position = modelled_position(s.thrust, own.thrust, model.lag, dt)
         elevator_position = modelled_position(s.elevator, own.elevator, model.lag, dt)
         thrust = leading_command(thrust_position, law.thrust, model.lag, gains.lead)
@@ -340,6 +332,9 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     if gains.rate_filter > 0.0:
         V_rate_f = s.V_rate_f + dt * first_order_rate(s.V_rate_f, law.V_rate, gains.rate_filter)
         V_rate = s.V_rate_f
+    z_mean = z_id
+    if weights == 0.0:
+        z_mean += dt * z_id_rate
     after = State(
         x1=s.x1 + dt * law.x1_rate,
         x2=s.x2 + dt * law.x2_rate,
@@ -350,7 +345,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         xi1=s.xi1 + dt * law.xi1_rate,
         xi2=s.xi2 + dt * law.xi2_rate,
         V_mean=V_id,
-        z_mean=z_id,
+        z_mean=z_mean,
         V_r=V_d,
         V_r_rate=V_d_rate,
         z_r=z_d,
@@ -360,6 +355,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         V_rate_f=V_rate_f,
         V_before=own.V,
         V_rate_before=law.V_rate - law.d1_hat,
+        begun=begun,
     )
     return after, Output(
         thrust,
@@ -408,12 +404,51 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    positive = "k11 k12 k21 k31 k32 k42 k51 k52 tau1 tau2 tau3 oldest".split()
+    positive = "k11 k12 k21 k31 k32 k42 k51 k52 tau1 tau2 tau3 oldest filter_damping".split()
     problems = [
         Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
         for name in positive
         if getattr(gains, name) <= 0.0
     ]
+    if problems:
+        return problems
+    if gains.k32 < 5.9:
+        problems.append(
+            Problem(
+                False,
+                f"gain k32 = {gains.k32:g} 1/s: condition (4.63) asks for more than g_gamma + 1, about 5.9 at 30 m/s; the "
+                "published value does not meet it either and flies",
+            )
+        )
+    h = flight.period
+    rates = {
+        "k11, k12": gains.k11 + gains.k12,
+        "k31": gains.k31,
+        "k51, k52": gains.k51 + gains.k52,
+        "tau1": 1.0 / gains.tau1,
+        "tau2": 1.0 / gains.tau2,
+        "tau3": 1.0 / gains.tau3,
+    }
+    for name, rate in rates.items():
+        if rate * h >= 2.0:
+            problems.append(
+                Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {h * 1e3:g} ms")
+            )
+    if h > 0.01:
+        problems.append(
+            Problem(False, f"control rate {1.0 / h:.0f} Hz: the pitch-rate loop needs 100 Hz, and 200 Hz for its claims")
+        )
+    if gains.filter_frequency == 0.0 and flight.exchange_period > 0.01:
+        problems.append(
+            Problem(
+                False,
+                "without the filter of the averages (gain filter_frequency) the ring is unstable for neighbours at less "
+                f"than 100 Hz; they are heard at {1.0 / flight.exchange_period:.0f} Hz",
+            )
+        )
+    if flight.exchange_period + flight.latency >= gains.oldest:
+        problems.append(
+            Problem(True, f"gain oldest = {gains.oldest:g} s: every record would be too old, it must exceed the exchange "
+                    f"period plus the latency, {flight.exchange_period + flight.latency:g} s")
+        )
     return problems
-
-

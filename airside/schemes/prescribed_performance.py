@@ -11,8 +11,8 @@ Departures from the printed law, each a gain; the `monograph` form has only the 
 - the inner gain divided by a third of the elevator's nominal effectiveness, and an estimator of the pitch acceleration
   that it does not explain: this carries the fault at a moderate gain. The printed inner loop needs 1 kHz;
 - a lead against the servo's lag;
-- a smoothed reference, a filtered rate and a limit on the observer's rate: the chain of filters multiplies every step of
-  the reference by 1/(tau1 tau2 tau3). Altitude through a complementary filter, for the same reason;
+- a smoothed reference, a filtered rate and a limit on the observer's rate: the chain of filters multiplies every step
+  of the reference by 1/(tau1 tau2 tau3). Altitude through a complementary filter, for the same reason;
 - limits on the virtual controls and on the adapted parameters: recovery from saturation instead of a limit cycle;
 - the speed integral held while the thrust command is saturated;
 - neighbours extrapolated by the rate that they send.
@@ -21,8 +21,10 @@ Networks (sizes, centres, widths) are chosen; sign() is tanh(./phi).
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, positive, stable_in_steps
 from ftcc.airside.elements.actuators import lead_filter
 from ftcc.airside.elements.filters import butterworth, complementary_rate, first_order_rate, limited_tracker
 from ftcc.airside.elements.neighbours import disagreement
@@ -75,7 +77,7 @@ class Gains(NamedTuple):
     w44: Annotated[float, Q("w44", "-", "leak of the pitch rate", 0.02)]
     k52: Annotated[float, Q("k52", "1/s", "auxiliary system", 3.0)]
     mu: Annotated[float, Q("mu", "rad", "threshold of the auxiliary system", 0.01)]
-    network_filter: Annotated[float, Q("w_f", "rad/s", "low-pass that breaks the networks' algebraic loop (chosen)", 20.0)]
+    network_filter: Annotated[float, Q("w_f", "rad/s", "low-pass that breaks the algebraic loop (chosen)", 20.0)]
     networks: Annotated[float, Q("networks", "-", "1: networks on", 1.0)]
     auxiliary: Annotated[float, Q("auxiliary", "-", "1: auxiliary system on", 1.0)]
     xi_term: Annotated[float, Q("X", "-", "1: the xi' term of the flight-path command on", 1.0)]
@@ -126,20 +128,29 @@ class State(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one evaluation of the law shows."""
+    """One evaluation of the law: commands first, then virtual controls, errors and what the states' rates need."""
 
     thrust: float
     elevator: float
-    rate: float
+    elevator_wanted: float
+    speed_error: float
+    z_d_rate: float
+    v_ref: float
     error: float
     width: float
-    share: float
     transformed: float
+    gamma_bar: float
+    theta_bar: float
+    q_bar: float
     E3: float
     E4: float
     E5: float
+    energy_gamma: float
+    energy_q: float
     unexplained: float
-    elevator_wanted: float
+    q_h_rate: float
+    u_before_lead: float
+    lead_rate: float
 
 
 SHARED = {
@@ -197,35 +208,6 @@ _LEAST_AIRSPEED = 5.0
 """Airspeed guard in every division, m/s."""
 
 
-class _Evaluation(NamedTuple):
-    """One evaluation of the law: commands, virtual controls and what the rates of the states need."""
-
-    thrust: float
-    u: float
-    u_wanted: float
-    u_before_lead: float
-    lead_rate: float
-    speed_error: float
-    z_d_rate: float
-    z_ref: float
-    v_ref: float
-    z_m: float
-    error: float
-    width: float
-    share: float
-    transformed: float
-    gamma_bar: float
-    theta_bar: float
-    q_bar: float
-    E3: float
-    E4: float
-    E5: float
-    energy_gamma: float
-    energy_q: float
-    unexplained: float
-    q_h_rate: float
-
-
 @compiled
 def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[no-untyped-def]
     """Eqs. (3.7)-(3.57) for the states ``s`` as they stand; ``total`` is the disagreement with the neighbours."""
@@ -252,13 +234,13 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[n
     # Performance transform (3.25)-(3.29).
     width, width_rate = performance_tube(own.t - s.t_start, gains.tube_first, gains.tube_last, gains.tube_decay)
     error = z_m - z_ref
-    used, transformed, slope, slope_rate = performance_transform(
+    share_used, transformed, slope, slope_rate = performance_transform(
         error, climb - v_ref, width, width_rate, gains.kl, gains.ku
     )
 
     # Step 1: altitude (3.30), (3.31).
     drift = gains.xi_term * slope_rate / (2.0 * slope * slope)
-    gamma_bar = (-(gains.k21 - drift) * transformed + v_ref + used * width_rate) / divisor
+    gamma_bar = (-(gains.k21 - drift) * transformed + v_ref + share_used * width_rate) / divisor
     gamma_bar = limited(gamma_bar, gains.gamma_limit)
     gamma_d_rate = first_order_rate(s.gamma_d, gamma_bar, gains.tau1)
 
@@ -304,20 +286,15 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[n
     if gains.lead_fast > 0.0:
         u_wanted, lead_rate = lead_filter(s.u_l, u_before_lead, gains.lead_slow, gains.lead_fast)
     u = clip(u_wanted, -model.elevator_max, -model.elevator_min)
-    return _Evaluation(
+    return Output(
         thrust,
-        u,
-        u_wanted,
-        u_before_lead,
-        lead_rate,
+        -u,
+        -u_wanted,
         speed_error,
         z_d_rate,
-        z_ref,
         v_ref,
-        z_m,
         error,
         width,
-        used,
         transformed,
         gamma_bar,
         theta_bar,
@@ -329,6 +306,8 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[n
         energy_q,
         unexplained,
         q_h_rate,
+        u_before_lead,
+        lead_rate,
     )
 
 
@@ -399,7 +378,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     if gains.altitude_filter > 0.0:
         z_h_rate = complementary_rate(s.z_h, own.V * own.gamma, own.z, gains.altitude_filter)
     theta_f_rate, theta_f_acceleration = butterworth(s.theta_f, s.theta_f_rate, own.theta, gains.network_filter)
-    u_f_rate, u_f_acceleration = butterworth(s.u_f, s.u_f_rate, law.u, gains.network_filter)
+    u_f_rate, u_f_acceleration = butterworth(s.u_f, s.u_f_rate, -law.elevator, gains.network_filter)
     F_gamma_rate = adaptation_rate(s.F_gamma, law.E3, law.energy_gamma, gains.w21, gains.g11, gains.w24)
     F_q_rate = adaptation_rate(s.F_q, law.E5, law.energy_q, gains.w41, gains.g21, gains.w44)
     after = State(
@@ -409,7 +388,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         q_d=s.q_d + dt * first_order_rate(s.q_d, law.q_bar, gains.tau3),
         F_gamma=_capped(s.F_gamma + dt * F_gamma_rate, gains.cap),
         F_q=_capped(s.F_q + dt * F_q_rate, gains.cap),
-        zeta=gains.auxiliary * auxiliary_step(s.zeta, gains.k52, law.E5, law.u - law.u_wanted, gains.mu, dt),
+        zeta=gains.auxiliary * auxiliary_step(s.zeta, gains.k52, law.E5, law.elevator_wanted - law.elevator, gains.mu, dt),
         integral=s.integral + dt * integral_rate,
         theta_f=s.theta_f + dt * theta_f_rate,
         theta_f_rate=s.theta_f_rate + dt * theta_f_acceleration,
@@ -420,31 +399,18 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         z_r=s.z_r + dt * z_r_rate,
         v_r=s.v_r + dt * v_r_rate,
         q_h=s.q_h + dt * law.q_h_rate,
-        u_s=s.u_s + dt * gains.servo * (law.u - s.u_s),
+        u_s=s.u_s + dt * gains.servo * (-law.elevator - s.u_s),
         u_l=s.u_l + dt * law.lead_rate,
         V_before=own.V,
         t_start=s.t_start,
     )
-    return after, Output(
-        law.thrust,
-        -law.u,
-        law.v_ref,
-        law.error,
-        law.width,
-        law.share,
-        law.transformed,
-        law.E3,
-        law.E4,
-        law.E5,
-        law.unexplained,
-        -law.u_wanted,
-    )
+    return after, law
 
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
     """What the neighbours hear, for the instant of ``state``."""
-    return state.z_d, output.rate
+    return state.z_d, output.v_ref
 
 
 @compiled
@@ -470,35 +436,19 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    positive = (
-        "k11 k12 beta1 phi tube_first tube_last tube_decay kl ku k21 tau1 k31 w21 w22 w23 g11 w24 tau2 k41 tau3 k51 w41 "
-        "w42 w43 g21 w44 k52 mu network_filter inner servo"
-    ).split()
-    problems = [
-        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
-        for name in positive
-        if getattr(gains, name) <= 0.0
-    ]
+    problems = positive(
+        gains,
+        ["k11", "k12", "beta1", "phi", "tube_first", "tube_last", "tube_decay", "kl", "ku", "k21", "k31", "k41", "k51"]
+        + ["k52", "tau1", "tau2", "tau3", "w21", "w22", "w23", "w24", "g11", "w41", "w42", "w43", "w44", "g21", "mu"]
+        + ["network_filter", "inner", "servo"],
+    )
     if problems:
         return problems
     if gains.tube_first < gains.tube_last:
-        problems.append(Problem(True, "gain tube_first: the tube must not widen, epsilon(0) >= epsilon(inf), eq. (3.25)"))
-    if gains.beta2 <= flight.leader_climb:
-        problems.append(
-            Problem(
-                True,
-                f"gain beta2 = {gains.beta2:g} m/s: must exceed the leader's largest climb rate, "
-                f"{flight.leader_climb:.3f} m/s (Theorem 3.1)",
-            )
-        )
-    if 0.0 < gains.observer_limit <= flight.leader_climb:
-        problems.append(
-            Problem(
-                True,
-                f"gain observer_limit = {gains.observer_limit:g} m/s: must exceed the leader's largest climb rate, "
-                f"{flight.leader_climb:.3f} m/s",
-            )
-        )
+        problems.append(Problem(True, "gain tube_first: the tube must not widen, epsilon(0) >= epsilon(inf)"))
+    problems += above_leaders_climb(gains, "beta2", flight, "Theorem 3.1")
+    if gains.observer_limit > 0.0:
+        problems += above_leaders_climb(gains, "observer_limit", flight, "or the estimate cannot follow")
     if flight.leader_speed_varies:
         problems.append(Problem(True, "the leader's speed must be constant: followers know it as a mission constant"))
     if gains.in_flight == 0.0:
@@ -508,8 +458,8 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 problems.append(
                     Problem(
                         True,
-                        f"UAV {uav} starts at z = {initial.z:g} m, {error:+g} m from the estimate's start: outside of the "
-                        f"performance tube -{gains.kl * gains.tube_first:g} .. {gains.ku * gains.tube_first:g} m, "
+                        f"UAV {uav} starts at z = {initial.z:g} m, {error:+g} m from the estimate's start: outside "
+                        f"of the performance tube -{gains.kl * gains.tube_first:g} .. {gains.ku * gains.tube_first:g} m, "
                         "eq. (3.24)",
                     )
                 )
@@ -518,27 +468,22 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
             problems.append(
                 Problem(
                     False,
-                    f"gain {name} = {getattr(gains, name):g}: not > 1/2, the sufficient condition (3.71); the published "
-                    "values do not meet it either and fly",
+                    f"gain {name} = {getattr(gains, name):g}: not > 1/2, the sufficient condition (3.71); the "
+                    "published values do not meet it either and fly",
                 )
             )
     h = flight.period
-    degree = max(sum(flight.graph.weights.get((i, j), 0.0) for j in flight.graph.uavs) for i in flight.graph.followers)
     rates = {
-        "beta1, beta2 / phi": degree * (gains.beta1 + gains.beta2 / gains.phi),
+        "beta1, beta2 / phi": largest_degree(flight) * (gains.beta1 + gains.beta2 / gains.phi),
         "tau1": 1.0 / gains.tau1,
         "tau2": 1.0 / gains.tau2,
         "tau3": 1.0 / gains.tau3,
         "lead_fast": 1.0 / gains.lead_fast if gains.lead_fast > 0.0 else 0.0,
-        "network_filter": gains.network_filter * 2.0**0.5,
+        "network_filter": gains.network_filter * math.sqrt(2.0),
         "estimator": gains.estimator,
         "servo": gains.servo,
     }
-    for name, rate in rates.items():
-        if rate * h >= 2.0:
-            problems.append(
-                Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {h * 1e3:g} ms")
-            )
+    problems += stable_in_steps(rates, h)
     if gains.inner == 1.0 and h > 0.001:
         problems.append(
             Problem(

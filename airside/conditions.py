@@ -1,0 +1,48 @@
+"""Conditions on gains that several schemes share, as findings of their checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ftcc.airside.scheme import Flight, Problem
+
+__all__ = ["above_leaders_climb", "largest_degree", "positive", "stable_in_steps"]
+
+
+def positive(gains: Any, names: Iterable[str]) -> list[Problem]:
+    """Every gain of ``names`` must be > 0."""
+    return [
+        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
+        for name in names
+        if not getattr(gains, name) > 0.0
+    ]
+
+
+def largest_degree(flight: Flight) -> float:
+    """Largest sum of weights with which a follower hears."""
+    graph = flight.graph
+    return max(sum(graph.weights.get((i, j), 0.0) for j in graph.uavs) for i in graph.followers)
+
+
+def stable_in_steps(rates: Mapping[str, float], step: float) -> list[Problem]:
+    """No rate (1/s, by the gain that sets it) may reach 2/step: explicit Euler steps of ``step`` seconds."""
+    return [
+        Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {step * 1e3:g} ms")
+        for name, rate in rates.items()
+        if rate * step >= 2.0
+    ]
+
+
+def above_leaders_climb(gains: Any, name: str, flight: Flight, source: str) -> list[Problem]:
+    """A gain in m/s must exceed the leaders' largest climb rate."""
+    value = getattr(gains, name)
+    if value > flight.leader_climb:
+        return []
+    return [
+        Problem(
+            True,
+            f"gain {name} = {value:g} m/s: must exceed the leaders' largest climb rate, "
+            f"{flight.leader_climb:.3f} m/s ({source})",
+        )
+    ]

@@ -1,0 +1,183 @@
+"""The command line ``ftcc``: scenarios, single-process flights and reports. Flights as processes are in `cli_fly`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ftcc.groundside import cli_fly
+from ftcc.groundside.cli_common import (
+    Duration,
+    Form,
+    Out,
+    ScenarioName,
+    Seed,
+    Settings,
+    Variants,
+    fail,
+    load_mission,
+    load_scenario,
+    new_run_folder,
+    show_summary,
+    terminal,
+    warn,
+)
+from ftcc.groundside.errors import UserError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="ftcc",
+    help="Software in the loop for swarms of fixed-wing UAVs under fault-tolerant cooperative control.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+@app.command("list")
+def list_all() -> None:
+    """List schemes and shipped scenarios with their forms and variants."""
+    from rich.table import Table
+
+    from ftcc.airside import schemes
+    from ftcc.groundside.scenario import forms_and_variants, read, shipped
+
+    def table(*headings: str) -> Table:
+        made = Table(header_style="bold", box=None, pad_edge=False)
+        for heading in headings:
+            made.add_column(heading, overflow="fold", justify="right" if heading == "s" else "left")
+        return made
+
+    laws = table("scheme", "what it is", "forms")
+    for name in schemes.names():
+        scheme = schemes.find(name)
+        laws.add_row(name, scheme.title, ", ".join(scheme.forms))
+    scenarios = table("scenario", "what it flies", "s", "forms", "variants")
+    for name, path in shipped().items():
+        document = read(path)
+        forms, variants = forms_and_variants(document)
+        length = f"{document.get('duration', 0.0):g}"
+        scenarios.add_row(name, document.get("title", ""), length, ", ".join(forms), ", ".join(variants))
+    out = terminal()
+    out.print(laws)
+    out.print()
+    out.print(scenarios)
+
+
+@app.command()
+def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", settings: Settings = None) -> None:
+    """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
+    from ftcc.groundside.mission import resolve
+    from ftcc.groundside.scenario import forms_and_variants
+
+    first = load_scenario(scenario, form, variant, settings)
+    cases = {first.case: first}
+    if form is None and not variant and first.plan.flown is None:
+        forms, _ = forms_and_variants(first.source)
+        for case in [*forms, *(case for claim in first.plan.claims for case in claim.expected)]:
+            if case not in cases:
+                own_form, *variants = case.split("+")
+                cases[case] = load_scenario(scenario, own_form, ",".join(variants), settings)
+    out = terminal()
+    for case, chosen in cases.items():
+        mission = resolve(chosen)
+        timing = mission.timing
+        exchange = f"{1e6 / timing.exchange_us:g} Hz" if mission.wire else "ideal"
+        out.print(
+            f"{mission.name} {case}: {len(mission.graph.followers)} followers, {len(mission.graph.leaders)} leaders, "
+            f"{len(mission.graph.weights)} directed edges, {timing.duration:g} s, "
+            f"control {1e6 / timing.period_us:g} Hz, exchange {exchange}, {len(mission.claims)} claims: can fly",
+            highlight=False,
+            soft_wrap=True,
+        )
+        for text in mission.warnings:
+            warn(f"{mission.name} {case}: {text}")
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioName,
+    form: Form = None,
+    variant: Variants = "",
+    duration: Duration = None,
+    seed: Seed = None,
+    out: Out = None,
+    settings: Settings = None,
+) -> None:
+    """Fly a scenario in one process, as fast as this machine can, and record it."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    from ftcc.groundside.simulate import simulate as fly_and_record
+
+    mission = load_mission(scenario, form, variant, settings, seed, duration)
+    folder = new_run_folder(mission, out)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"))
+    with Progress(*columns, console=terminal(stderr=True), transient=True) as progress:
+        task = progress.add_task("preparing (the first start compiles for half a minute)", total=None)
+        flying = f"simulating {mission.name} {mission.case}"
+        run = fly_and_record(
+            mission,
+            folder,
+            lambda t: progress.update(task, completed=t),
+            lambda: progress.update(task, description=flying, total=mission.timing.duration),
+        )
+    show_summary(folder)
+    for uav, text in run.lost.items():
+        warn(f"UAV {uav}: {text}")
+    interrupted = run.end < mission.timing.duration - mission.timing.period * mission.timing.record_every
+    if run.lost or interrupted:
+        raise typer.Exit(1)
+
+
+@app.command()
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
+    json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON.")] = False,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
+    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
+    figures: Annotated[bool, typer.Option("--figures", help="Draw the flight into RUN/report.")] = False,
+) -> None:
+    """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
+    from ftcc.groundside.claims import failed
+    from ftcc.groundside.report import as_json, claims_of, draw, show
+    from ftcc.groundside.run import Run, RunError
+
+    recorded = Run(run)
+    results = claims_of(recorded)
+    out = terminal()
+    if json:
+        print(as_json(recorded, results))
+    else:
+        show(out, recorded, results)
+    written = terminal(stderr=True)
+    for option, file, export in (("--csv", csv, recorded.export_csv), ("--mat", mat, recorded.export_mat)):
+        if file is not None:
+            try:
+                export(file)
+            except OSError as error:
+                raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
+            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    if figures:
+        for file in draw(recorded):
+            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    if failed(results):
+        raise typer.Exit(1)
+
+
+cli_fly.register(app)
+
+
+def main() -> None:
+    """Entry point: bad input ends with one message and exit code 2."""
+    try:
+        app()
+    except UserError as error:
+        fail(str(error))
+
+
+if __name__ == "__main__":
+    main()

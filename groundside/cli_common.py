@@ -1,0 +1,138 @@
+"""What the commands have in common: options, messages, and the way from options to a mission and a folder."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Scenario
+
+__all__ = [
+    "Duration",
+    "Form",
+    "Out",
+    "ScenarioName",
+    "Seed",
+    "Settings",
+    "Variants",
+    "fail",
+    "load_mission",
+    "load_scenario",
+    "new_run_folder",
+    "show_claims",
+    "show_summary",
+    "terminal",
+    "warn",
+]
+
+ScenarioName = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario's name, a TOML file, or a run to fly again.")
+]
+Form = Annotated[str | None, typer.Option(help="Form of the control law; default: the scenario's first.")]
+Variants = Annotated[str, typer.Option("--variant", metavar="A,B", help="Variants of the scenario.")]
+Duration = Annotated[float | None, typer.Option(help="Simulated time to fly, s.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of losses, jitter and noise.")]
+Out = Annotated[Path | None, typer.Option(help="Folder of the run; default: runs/SCENARIO-TIME.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a value of the scenario; repeatable."),
+]
+
+_PIPE_WIDTH = 200
+"""Columns where the output is no terminal: tables must not be folded into a file."""
+
+
+def terminal(stderr: bool = False) -> Console:
+    """Standard output, or standard error."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, width=None if stream.isatty() else _PIPE_WIDTH)
+
+
+def _say(text: str, style: str) -> None:
+    terminal(stderr=True).print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def warn(text: str) -> None:
+    """A warning to the user."""
+    _say(f"warning: {text}", "yellow")
+
+
+def fail(text: str) -> NoReturn:
+    """Bad input: one message, exit code 2."""
+    _say(f"ftcc: {text}", "bold red")
+    sys.exit(2)
+
+
+def load_scenario(
+    name: str,
+    form: str | None,
+    variant: str,
+    settings: list[str] | None,
+    seed: int | None = None,
+    duration: float | None = None,
+) -> Scenario:
+    """The scenario that the options ask for."""
+    from ftcc.groundside.scenario import load
+
+    variants = [one.strip() for one in variant.split(",") if one.strip()]
+    return load(name, form=form, variants=variants, settings=settings or [], seed=seed, duration=duration)
+
+
+def load_mission(
+    name: str,
+    form: str | None,
+    variant: str,
+    settings: list[str] | None,
+    seed: int | None,
+    duration: float | None,
+) -> Mission:
+    """The mission that the options ask for; its warnings go to the user."""
+    from ftcc.groundside.mission import resolve
+
+    mission = resolve(load_scenario(name, form, variant, settings, seed, duration))
+    for text in mission.warnings:
+        warn(f"{mission.name}: {text}")
+    return mission
+
+
+def new_run_folder(mission: Mission, out: Path | None) -> Path:
+    """The folder of a new run, created."""
+    from ftcc.groundside.run import new_folder
+
+    return new_folder(mission.name, out)
+
+
+def show_claims(folder: Path) -> None:
+    """Merge the recording of a run if need be and print how its claims stand."""
+    from ftcc.groundside import report
+    from ftcc.groundside.run import Run, RunError
+
+    try:
+        results = report.claims_of(Run(folder))
+    except RunError as error:
+        # A flight that ended before anything was recorded has said why already.
+        warn(str(error))
+        return
+    if results:
+        report.show_claims(terminal(), results)
+
+
+def show_summary(folder: Path) -> None:
+    """How many of a run's claims hold, and where the run is."""
+    from ftcc.groundside import report
+    from ftcc.groundside.run import Run
+
+    out = terminal()
+    results = report.claims_of(Run(folder))
+    if results:
+        out.print(f"{report.summary(results)}: ftcc report {folder}", markup=False, highlight=False, soft_wrap=True)
+    out.print(f"recorded in {folder}", markup=False, highlight=False, soft_wrap=True)

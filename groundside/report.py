@@ -1,0 +1,160 @@
+"""What a run showed: its claims and events, as tables, JSON and figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ftcc.groundside.claims import Result, evaluate
+from ftcc.groundside.run import Run
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["as_json", "claims_of", "draw", "show", "show_claims", "summary"]
+
+_MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not flown[/]"}
+
+
+def claims_of(run: Run) -> list[Result]:
+    """The claims of a run's scenario, held against what it recorded."""
+    mission = run.mission
+    return evaluate(run, mission.claims, mission.case, mission.graph)
+
+
+def as_json(run: Run, results: list[Result]) -> str:
+    """The claims for programs: ``value`` and ``ok`` are null where the flight did not cover the window."""
+    mission = run.mission
+    document = {
+        "scenario": mission.name,
+        "form": mission.form,
+        "variant": ",".join(mission.variants),
+        "claims": [result.as_json() for result in results],
+    }
+    return json.dumps(document, indent=2, allow_nan=False)
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        return " ".join(f"{one:.5g}" for one in value)
+    return f"{value:.4g}"
+
+
+def summary(results: list[Result]) -> str:
+    """How many claims hold."""
+    held = sum(result.ok is True for result in results)
+    not_flown = sum(result.ok is None for result in results)
+    return f"{held} of {len(results)} claims hold" + (f", {not_flown} not flown" if not_flown else "")
+
+
+def show_claims(console: Console, results: list[Result]) -> None:
+    """A table of claims: what was expected, what was measured."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(header_style="bold", pad_edge=False)
+    for heading, justify in (
+        ("claim", "left"),
+        ("UAV", "left"),
+        ("window, s", "left"),
+        ("measured", "right"),
+        ("expected", "right"),
+        ("tolerance", "left"),
+        ("", "left"),
+        ("source", "left"),
+    ):
+        table.add_column(heading, justify=justify, overflow="fold")  # type: ignore[arg-type]
+    for result in results:
+        claim = result.claim
+        start, end = claim.window
+        unit = f" {claim.unit}" if claim.unit else ""
+        table.add_row(
+            escape(claim.name),
+            _ids(result.uavs),
+            f"{start:g}" if start == end else f"{start:g} - {end:g}",
+            f"{_number(result.value)}{unit if result.value is not None else ''}",
+            _number(result.expected),
+            escape(result.tolerance),
+            _MARKS[result.ok] + (f" [dim]({escape(result.remark)})[/]" if result.remark and result.ok is False else ""),
+            escape(claim.source),
+        )
+    console.print(table)
+    console.print(summary(results), highlight=False)
+
+
+def _ids(uavs: tuple[int, ...]) -> str:
+    """Ids in short: 1-6, 8."""
+    runs: list[list[int]] = []
+    for uav in sorted(uavs):
+        if runs and uav == runs[-1][-1] + 1:
+            runs[-1].append(uav)
+        else:
+            runs.append([uav])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+
+
+def show(console: Console, run: Run, results: list[Result]) -> None:
+    """The whole report on the terminal: what was flown, what happened, which claims hold."""
+    from rich.markup import escape
+
+    mission = run.mission
+    console.print(f"[bold]{escape(mission.title)}[/]")
+    console.print(
+        f"{mission.name}, form {mission.form}{', variant ' + ', '.join(mission.variants) if mission.variants else ''}, "
+        f"seed {mission.timing.seed}, {run.end:g} of {mission.timing.duration:g} s flown, {len(run.uavs)} UAVs",
+        highlight=False,
+    )
+    colours = {"error": "bold red", "warning": "yellow"}
+    for event in run.events:
+        who = f"UAV {event['uav']}: " if event.get("uav") is not None else ""
+        colour = colours.get(str(event.get("severity")), "default")
+        text = str(event["text"])
+        who = "" if text.startswith("UAV ") else who
+        console.print(f"[dim]{event['t']:9.2f} s[/]  [{colour}]{escape(who + text)}[/]", highlight=False)
+    if results:
+        show_claims(console, results)
+    else:
+        console.print(f"the scenario makes no claims for case {mission.case}")
+
+
+_FIGURES = (
+    ("altitudes", "z", "altitude, m", "all"),
+    ("altitude_tracking", "z - z_r", "altitude tracking error, m", "followers"),
+    ("speeds", "V", "airspeed, m/s", "followers"),
+    ("elevators", "elevator_command", "elevator command, rad", "followers"),
+    ("thrusts", "thrust_command", "thrust command, N", "followers"),
+)
+
+
+def draw(run: Run, folder: Path | None = None) -> list[Path]:
+    """Draw the flight against time, a figure per quantity, into the run's ``report`` folder (or ``folder``)."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    from ftcc.groundside.metrics import evaluated, names_in
+
+    mission = run.mission
+    folder = folder or run.path / "report"
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, expression, label, who in _FIGURES:
+        if not names_in(expression) <= set(run.names):
+            continue
+        figure, axes = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
+        for uav in mission.graph.followers if who == "followers" else mission.uavs:
+            t = run.column("t", uav)
+            style = "--" if uav in mission.graph.leaders else "-"
+            axes.plot(t, evaluated(expression, run, mission.graph, uav), style, linewidth=1.0, label=f"UAV {uav}")
+        for t_event, _, _ in mission.events:
+            axes.axvline(t_event, color="0.8", linewidth=0.7, zorder=0)
+        axes.set(xlabel="t, s", ylabel=label)
+        axes.legend(fontsize="small", ncols=4, frameon=False)
+        written.append(folder / f"{name}.png")
+        figure.savefig(written[-1], dpi=150)
+        plt.close(figure)
+    return written

@@ -1,0 +1,73 @@
+"""A real autopilot process's crew for UAV 1, alone, with a test in the place of its vehicle."""
+
+from __future__ import annotations
+
+import threading
+from multiprocessing import Pipe
+from pathlib import Path
+
+import numpy as np
+
+from ftcc.airside.process import Crew
+from ftcc.link.gate import Gate, Go, Limit, Pace, Release, Stop
+from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint, read_command, state_messages
+from ftcc.link.ports import reserve
+from ftcc.link.process import Setting
+from ftcc.sim.sensors import STATE_MESSAGE
+from tests.swarm import autopilot, timing
+
+
+def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarray:
+    """State messages of an aircraft that does not exist."""
+    values = dict.fromkeys(STATE_MESSAGE, 0.0)
+    values |= {"q1": np.cos(theta / 2), "q3": np.sin(theta / 2), "pitchspeed": q, "z": -z}
+    values |= {"vx": V * np.cos(gamma), "vz": -V * np.sin(gamma)}
+    return np.array(list(values.values())).astype(np.float32).astype(np.float64)
+
+
+class Bench:
+    """The crew, its sockets and its gate; as a context it flies in a thread."""
+
+    def __init__(self, folder: Path, ticks: int) -> None:
+        self.block = reserve((1,))
+        ports = self.block.of(1)
+        self.timing = timing("flight", ticks / 100)
+        setting = Setting("test", self.timing, True, {1: ports}, {1: 1}, self.block.station, folder)
+        self.launcher, pipe = Pipe()
+        self.vehicle = Endpoint(1, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
+        self.station = Endpoint(STATION, 1, self.block.station)
+        self.crew = Crew([autopilot(1, neighbours=())], setting, Gate(pipe))
+        self._thread = threading.Thread(target=self.crew.fly)
+
+    def __enter__(self) -> Bench:
+        self.launcher.send(Go(Pace(0.0, 0, 1.0), Limit(None)))
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.launcher.send(Stop())
+        self.launcher.send(Release())
+        self._thread.join(20.0)
+        assert not self._thread.is_alive()
+
+    def close(self) -> None:
+        """Free the ports."""
+        self.crew.close()
+        self.vehicle.close()
+        self.station.close()
+        self.block.release()
+
+    def answer(self, tick: int, state: np.ndarray, controls: np.ndarray, *more: object) -> np.ndarray:
+        """The command (fractions of travel) that answers a state."""
+        stamp = tick * self.timing.period_us
+        command = np.zeros(4)
+        for _ in range(100):
+            if more:
+                self.vehicle.send(*more)
+            self.vehicle.send(*state_messages(stamp, state, controls))
+            for _ in range(200):
+                for message in self.vehicle.receive():
+                    if read_command(message, command) == stamp:
+                        return command
+                threading.Event().wait(0.0005)
+        raise AssertionError(f"no answer to the state of tick {tick}")

@@ -1,0 +1,177 @@
+"""Schemes as files: the registry, gains by form, and what a file that lacks something is told."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import pkgutil
+import re
+from types import ModuleType
+from typing import Annotated, NamedTuple
+
+import pytest
+
+import ftcc.airside.schemes
+from ftcc.airside import schemes
+from ftcc.airside.scheme import Quantity, Scheme, load, quantities
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.compiled import SCHEME_ENTRY_POINTS
+from ftcc.link.graph import Assumption
+
+PUBLISHED = {
+    "k11": 7.3, "k12": 24.1, "k21": 2.2, "k31": 14.0, "k41": 39.0, "k51": 5.4, "k22": 6.4, "k42": 46.0, "k52": 12.1,
+    "e1": 0.01, "e2": 0.01, "l1": 2.0, "l2": 2.0, "beta1": 8.0, "beta2": 3.0, "phi": 0.1, "kappa": 1.0,
+}  # fmt: skip
+"""Reference: the design parameters of chapter 5."""
+
+FLIGHT = {"k11": 3.0, "k12": 3.0, "k21": 2.0, "k31": 6.0, "k41": 20.0, "k51": 3.0, "k22": 2.0, "k42": 12.0, "k52": 6.0}
+"""Reference: the gains for actuators with lag."""
+
+
+@pytest.fixture
+def containment() -> Scheme:
+    return schemes.find("containment")
+
+
+def test_every_file_of_the_folder_is_a_scheme():
+    files = [info.name for info in pkgutil.iter_modules(ftcc.airside.schemes.__path__)]
+    assert set(files) <= set(schemes.names())
+    for name in files:
+        assert schemes.find(name).name == name
+
+
+def test_an_unknown_scheme_is_answered_with_those_that_exist():
+    with pytest.raises(LookupError) as refusal:
+        schemes.find("contaiment")
+    assert "there is no scheme 'contaiment'" in str(refusal.value)
+    assert "containment" in str(refusal.value)
+
+
+def test_other_packages_offer_schemes_by_an_entry_point(monkeypatch, tmp_path):
+    (tmp_path / "guest_scheme.py").write_text(
+        "from ftcc.airside.schemes.containment import *\n"
+        "from ftcc.airside.schemes.containment import SHARED, SIGNALS, GRAPH, COMMANDS, PLANT, FORMS, SWITCHES\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    entry = importlib.metadata.EntryPoint("guest", "guest_scheme", SCHEME_ENTRY_POINTS)
+    offered = {SCHEME_ENTRY_POINTS: [entry]}
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: offered.get(group, []))
+    schemes._modules.cache_clear()
+    try:
+        assert "guest" in schemes.names()
+        assert schemes.find("guest").module.__name__ == "guest_scheme"
+    finally:
+        monkeypatch.undo()
+        schemes._modules.cache_clear()
+        schemes.find.cache_clear()
+
+
+@pytest.mark.parametrize("name", schemes.names())
+def test_what_a_scheme_declares_is_complete(name):
+    scheme = schemes.find(name)
+    assert scheme.title
+    assert isinstance(scheme.graph, Assumption)
+    assert scheme.plant in ("longitudinal", "attitude", "position")
+    assert {"monograph", "flight"} <= set(scheme.forms)
+    assert set(scheme.commands) <= set(ACTUATORS)
+    assert scheme.module.Output._fields[: len(scheme.commands)] == scheme.commands, "commands come first"
+    for quantity in (*scheme.signals, *(q for row in scheme.shared.values() for q in row)):
+        assert isinstance(quantity, Quantity)
+        assert quantity.unit
+    assert len({signal.name for signal in scheme.signals}) == len(scheme.signals)
+    assert set(quantities(scheme.module.State)) == set(scheme.module.State._fields), "every state has name and unit"
+    for settings in (*scheme.forms.values(), *scheme.switches.values()):
+        assert set(settings) <= set(scheme.gains_type._fields)
+    for form in scheme.forms:
+        assert all(map(math.isfinite, scheme.gains(form, {})))
+
+
+def test_monograph_form_has_the_published_gains(containment):
+    gains = containment.gains("monograph", {})
+    assert {name: getattr(gains, name) for name in PUBLISHED} == PUBLISHED
+
+
+def test_flight_form_has_the_gains_for_lagging_actuators(containment):
+    gains = containment.gains("flight", {})
+    assert {name: getattr(gains, name) for name in FLIGHT} == FLIGHT
+    assert (gains.e1, gains.e2, gains.kappa) == (0.03, 0.03, 0.0)
+    assert (gains.shaper, gains.guard, gains.horizon) == (2.0, 1.0, 0.5)
+    assert (gains.beta1, gains.beta2, gains.phi) == (8.0, 3.0, 0.1), "what a form does not name stays as published"
+
+
+def test_overrides_come_last_and_change_nothing_else(containment):
+    gains = containment.gains("flight", {"k11": 4, "phi": 0.5})
+    assert gains == containment.gains("flight", {})._replace(k11=4.0, phi=0.5)
+    assert isinstance(gains.k11, float)
+
+
+@pytest.mark.parametrize(
+    ("form", "overrides", "because"),
+    [
+        ("flight", {"k99": 1.0}, "scheme containment has no gain 'k99'; it has k11, k12"),
+        ("flight", {"k11": math.nan}, "gain k11 = nan: must be a finite number"),
+        ("flight", {"k11": math.inf}, "gain k11 = inf: must be a finite number"),
+        ("fligth", {}, "scheme containment has no form 'fligth'; it has monograph, flight"),
+    ],
+)
+def test_gains_that_are_none_are_refused(containment, form, overrides, because):
+    with pytest.raises(ValueError, match=re.escape(because)):
+        containment.gains(form, overrides)
+
+
+def file_like(containment: Scheme, **changes: object) -> ModuleType:
+    """The containment scheme's file with names replaced, or left out where None."""
+    module = ModuleType("a_users_scheme", containment.module.__doc__)
+    contents = {name: value for name, value in vars(containment.module).items() if not name.startswith("__")}
+    for name, value in (contents | changes).items():
+        if value is not None:
+            setattr(module, name, value)
+    return module
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Gains",
+        "State",
+        "Output",
+        "SHARED",
+        "SIGNALS",
+        "GRAPH",
+        "COMMANDS",
+        "PLANT",
+        "FORMS",
+        "SWITCHES",
+        "start",
+        "step",
+        "share",
+        "observe",
+        "check",
+    ],
+)
+def test_a_file_that_lacks_something_is_refused_with_what_it_lacks(containment, name):
+    with pytest.raises(TypeError, match=rf"scheme mine \(a_users_scheme\) lacks {name}$"):
+        Scheme("mine", file_like(containment, **{name: None}))
+
+
+def test_everything_that_is_missing_is_said_at_once():
+    with pytest.raises(TypeError, match=r"lacks Gains, State, Output, SHARED.*start, step"):
+        load("empty", "ftcc.airside.model")
+
+
+def test_a_gain_without_unit_and_meaning_is_refused(containment):
+    class Gains(NamedTuple):
+        k: float
+
+    with pytest.raises(TypeError, match="gains k have no Quantity"):
+        Scheme("mine", file_like(containment, Gains=Gains))
+
+
+def test_a_gain_that_nobody_gave_a_value_must_be_given(containment):
+    class Gains(NamedTuple):
+        k: Annotated[float, Quantity("k", "1/s")]
+
+    scheme = Scheme("mine", file_like(containment, Gains=Gains, FORMS={"flight": {}}))
+    with pytest.raises(ValueError, match="gains k have no published value and must be given"):
+        scheme.gains("flight", {})
+    assert scheme.gains("flight", {"k": 2.0}).k == 2.0

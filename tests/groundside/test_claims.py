@@ -1,0 +1,187 @@
+"""Metrics and claims on signals whose numbers are known beforehand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ftcc.groundside.claims import Result, evaluate, tolerance_of
+from ftcc.groundside.metrics import METRICS, check_expression, evaluated
+from ftcc.groundside.schema import Claim
+from ftcc.link.graph import Graph
+
+GRAPH = Graph((1, 2), (7, 8), {(1, 7): 3.0, (1, 8): 1.0, (2, 1): 1.0, (1, 2): 1.0})
+T = np.arange(0, 1001) / 100.0
+
+
+@dataclass
+class Known:
+    """A recording of 10 s at 100 Hz."""
+
+    data: dict[tuple[str, int], NDArray[np.float64]] = field(default_factory=dict)
+
+    @property
+    def uavs(self) -> tuple[int, ...]:
+        return (1, 2, 7, 8)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return ("t", "z", "x")
+
+    def column(self, name: str, uav: int) -> NDArray[np.float64]:
+        if name == "t":
+            return T[: len(self.data[("z", uav)])]
+        return self.data[(name, uav)]
+
+
+@pytest.fixture()
+def known() -> Known:
+    return Known(
+        {
+            ("z", 7): np.full(1001, 1100.0),
+            ("z", 8): 1000.0 + 0.0 * T,
+            ("z", 1): 1075.0 + np.exp(-T),
+            ("z", 2): 1075.0 + 30.0 * (T < 1.0),
+            ("x", 1): np.sin(2.0 * math.pi * T),
+            ("x", 2): 2.0 * np.sin(2.0 * math.pi * T),
+        }
+    )
+
+
+def result(known: Known, **fields: Any) -> Result:
+    standard = {
+        "name": "claim",
+        "metric": "max_abs",
+        "signal": "x",
+        "window": (0.0, 10.0),
+        "source": "here",
+        "expected": {"flight": 2.0},
+        "tolerance": "1 %",
+    }
+    (one,) = evaluate(known, [Claim.model_validate(standard | fields)], "flight", GRAPH)
+    return one
+
+
+def test_the_containment_point_is_the_hull_weights_combination_of_the_leaders(known: Known) -> None:
+    np.testing.assert_allclose(evaluated("z_d", known, GRAPH, 1), 1075.0)
+    np.testing.assert_allclose(evaluated("z - z_d", known, GRAPH, 1), np.exp(-T), atol=1e-9)
+    assert evaluated("hull_distance", known, GRAPH, 2)[[0, 99, 100]].tolist() == [5.0, 5.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("metric", "threshold", "value"),
+    [
+        ("max_abs", None, 1.0),
+        ("max", None, 1.0),
+        ("min", None, -1.0),
+        ("mean", None, 0.0),
+        ("std", None, math.sqrt(0.5)),
+        ("rms", None, math.sqrt(0.5)),
+        ("integral_of_square", None, 5.0),
+        ("first_time", 0.5, 0.09),
+        ("time_until_below", 1.5, 0.0),
+        ("duration_above", 0.5, 3.3),
+    ],
+)
+def test_metrics_of_a_sine(known: Known, metric: str, threshold: float | None, value: float) -> None:
+    found = METRICS[metric].function(T, known.column("x", 1), threshold or 0.0)
+    assert found == pytest.approx(value, abs=0.011)
+
+
+def test_time_until_below_counts_from_the_windows_beginning_to_the_last_exceedance(known: Known) -> None:
+    one = result(
+        known,
+        metric="time_until_below",
+        signal="z - z_d",
+        uavs=[1],
+        window=[2.0, 9.0],
+        threshold=0.05,
+        expected={"flight": math.log(20.0) - 2.0},
+        tolerance="0.01",
+    )
+    assert one.ok
+
+
+def test_a_signal_that_never_settles_fails(known: Known) -> None:
+    one = result(known, metric="time_until_below", threshold=0.0001, uavs=[1], signal="1 + x / 10", tolerance="< 5")
+    assert (one.value, one.ok) == (None, False)
+
+
+def test_the_worst_uav_decides(known: Known) -> None:
+    assert result(known).value == pytest.approx(2.0)
+    farthest = result(known, metric="value_at", window=[0.25, 0.25], expected={"flight": 1.0}, tolerance="0.1")
+    assert (farthest.value, farthest.ok) == (pytest.approx(2.0), False)
+
+
+def test_a_list_gives_every_uav_its_own_expected_value(known: Known) -> None:
+    one = result(known, metric="value_at", window=[0.25, 0.25], expected={"flight": [1.0, 2.0]}, tolerance="1e-9")
+    assert (one.value, one.ok) == (pytest.approx([1.0, 2.0]), True)
+    one = result(known, metric="value_at", window=[0.25, 0.25], expected={"flight": [1.0, 1.0]}, tolerance="1e-9")
+    assert one.ok is False
+
+
+def test_a_window_that_was_not_flown_is_neither_held_nor_failed(known: Known) -> None:
+    one = result(known, window=[5.0, 20.0])
+    assert (one.value, one.ok) == (None, None)
+
+
+def test_a_uav_that_was_lost_before_the_end_of_the_window_fails(known: Known) -> None:
+    known.data[("z", 2)] = known.data[("z", 2)][:300]
+    known.data[("x", 2)] = known.data[("x", 2)][:300]
+    assert result(known, window=[1.0, 5.0]).ok is False
+    assert result(known, window=[1.0, 2.0]).ok is True
+
+
+def test_nan_fails(known: Known) -> None:
+    known.data[("x", 2)][500] = math.nan
+    one = result(known)
+    assert (one.value, one.ok) == (None, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "allowed"),
+    [
+        ("15 %", 2.3, True),
+        ("15 %", 1.69, False),
+        ("0.02", 2.02, True),
+        ("0.02", 1.97, False),
+        ("0", 2.0, True),
+        ("0", 2.0001, False),
+        ("< 0.05", 0.04, True),
+        ("< 0.05", 0.05, False),
+        ("> 3", 3.5, True),
+        ("< 1.5 x", 2.9, True),
+        ("< 1.5 x", 3.1, False),
+        ("15 %", math.nan, False),
+        ("< 5", -math.inf, False),
+    ],
+)
+def test_tolerances(text: str, value: float, allowed: bool) -> None:
+    assert tolerance_of(text).allows(value, 2.0) is allowed
+
+
+@pytest.mark.parametrize("text", ["", "x", "15 % x", "< 5 %", "1.5 x", "-3", "1e", "about 3"])
+def test_no_tolerance(text: str) -> None:
+    with pytest.raises(ValueError, match="is no tolerance"):
+        tolerance_of(text)
+
+
+@pytest.mark.parametrize(
+    "expression",
+    ["z.__class__", "z[0]", "(lambda: 1)()", "z if z else x", "'a'", "open('x')", "z == x", "z +", "f(x)", "True", "z;x"],
+)
+def test_expressions_are_arithmetic_and_nothing_else(expression: str) -> None:
+    with pytest.raises(ValueError, match=r"arithmetic|functions|operators|number|no expression"):
+        check_expression(expression, ["z", "x"])
+
+
+def test_expressions_compute(known: Known) -> None:
+    np.testing.assert_allclose(
+        evaluated("max(abs(-x) ** 2 / 4, 0.1) + 1", known, GRAPH, 2), np.maximum(known.column("x", 2) ** 2 / 4, 0.1) + 1
+    )
+    assert np.isinf(evaluated("1 / 0", known, GRAPH, 1)).all()

@@ -1,0 +1,145 @@
+"""The command line: what it prints, where, and with which exit code."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ftcc.groundside import Run
+from ftcc.groundside.cli import main
+
+Outcome = tuple[int, str, str]
+
+
+@pytest.fixture()
+def ftcc(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., Outcome]:
+    """Run a command in an empty folder: exit code, standard output, standard error."""
+
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["ftcc", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as exit_:
+            code = int(exit_.code or 0)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def test_list_shows_schemes_scenarios_forms_and_variants(ftcc: Callable[..., Outcome]) -> None:
+    code, out, _ = ftcc("list")
+    assert code == 0
+    for word in ("containment", "demo", "monograph", "loss30", "Distributed fault-tolerant containment control"):
+        assert word in out
+
+
+def test_check_names_every_case_that_it_checked(ftcc: Callable[..., Outcome]) -> None:
+    code, out, _ = ftcc("check", "demo")
+    assert code == 0
+    assert "demo flight: 6 followers, 2 leaders" in out
+    assert "can fly" in out
+
+
+def test_simulate_records_where_it_says(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    code, out, _ = ftcc("simulate", "demo", "--duration", 2, "--seed", 3, "--set", "channel.loss=0.5")
+    assert code == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert re.fullmatch(r"demo-\d{8}-\d{6}", folder.name)
+    assert f"recorded in runs/{folder.name}" in out
+    run = Run(folder)
+    assert (run.mission.timing.seed, run.mission.timing.duration) == (3, 2.0)
+    assert run.scenario.plan.channel.loss == 0.5
+    assert run.end == 2.0
+
+
+def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    settings = ("--set", "faults.0.at=20", "--set", "faults.0.without_trim=true")
+    code, _, err = ftcc("simulate", "containment", "--duration", 40, "--out", tmp_path / "run", *settings)
+    assert code == 1
+    assert "no level trim" in err
+    assert "UAV 1 lost" in err
+
+
+def test_report_prints_the_claims_and_ends_with_0_if_all_hold(ftcc: Callable[..., Outcome], demo_run: Run) -> None:
+    code, out, _ = ftcc("report", demo_run.path)
+    assert code == 0
+    assert "8 of 8 claims hold" in out
+    assert "altitude tracking of UAV 1 at its fault" in out
+    assert "link 8 - 4 cut" in out
+
+
+def test_report_json_has_the_promised_fields(ftcc: Callable[..., Outcome], demo_run: Run) -> None:
+    code, out, _ = ftcc("report", demo_run.path, "--json")
+    report = json.loads(out)
+    assert code == 0
+    assert list(report) == ["scenario", "form", "variant", "claims"]
+    assert (report["scenario"], report["form"], report["variant"]) == ("demo", "flight", "")
+    claim = report["claims"][3]
+    assert list(claim) == ["name", "uavs", "window", "value", "unit", "expected", "tolerance", "source", "ok"]
+    assert claim["uavs"] == [1]
+    assert claim["window"] == [40.0, 42.0]
+    assert claim["value"] == pytest.approx(0.453, rel=0.15)
+    assert (claim["unit"], claim["expected"], claim["tolerance"]) == ("m", 0.453, "15 %")
+    assert claim["ok"] is True
+
+
+def test_report_says_null_for_what_was_not_flown(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    assert ftcc("simulate", "demo", "--duration", 30, "--out", tmp_path / "short")[0] == 0
+    code, out, _ = ftcc("report", tmp_path / "short", "--json")
+    assert code == 0
+    assert [claim["ok"] for claim in json.loads(out)["claims"]] == [True, None, True, None, None, None, None, None]
+    assert json.loads(out)["claims"][1]["value"] is None
+
+
+def test_report_ends_with_1_if_a_claim_fails(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    ftcc("simulate", "demo", "--duration", 30, "--out", tmp_path / "bad", "--set", "claims.2.expected.flight=0.1")
+    code, out, _ = ftcc("report", tmp_path / "bad")
+    assert code == 1
+    assert "FAILS" in out
+
+
+def test_report_exports(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    ftcc("simulate", "demo", "--duration", 1, "--out", tmp_path / "run")
+    code, _, err = ftcc("report", "run", "--csv", "flight.csv", "--mat", "flight.mat", "--figures")
+    assert code == 0
+    assert "wrote flight.csv" in err
+    assert (tmp_path / "flight.csv").read_text().startswith('"t","uav","x"')
+    assert (tmp_path / "flight.mat").stat().st_size > 1000
+    assert {path.name for path in (tmp_path / "run" / "report").iterdir()} >= {"altitudes.png", "elevators.png"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fragments"),
+    [
+        (("simulate", "contanment"), ["contanment", "containment", "demo"]),
+        (("simulate", "demo", "--form", "monograph"), ["form = 'monograph'", "flight"]),
+        (("simulate", "demo", "--variant", "P"), ["variant = P"]),
+        (("simulate", "demo", "--set", "rates.control_rate=-1"), ["rates.control_rate = -1", "greater than 0"]),
+        (("simulate", "demo", "--set", "nonsense"), ["--set nonsense", "key.path=value"]),
+        (("simulate", "demo", "--duration", "abc"), ["--duration"]),
+        (("simulate", "demo", "--out", "/proc/none/run"), ["--out /proc/none/run", "cannot be written"]),
+        (("check", "missing.toml"), ["missing.toml", "no such file"]),
+        (("report", "nowhere"), ["nowhere", "no scenario.toml"]),
+        (("report",), ["RUN"]),
+        (("launch",), ["launch"]),
+    ],
+    ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else "",
+)
+def test_bad_input_ends_with_2_and_one_message_on_standard_error(
+    ftcc: Callable[..., Outcome], arguments: tuple[str, ...], fragments: list[str], tmp_path: Path
+) -> None:
+    code, out, err = ftcc(*arguments)
+    assert code == 2
+    for fragment in fragments:
+        assert fragment in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert not (tmp_path / "runs").exists()

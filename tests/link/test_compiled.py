@@ -1,0 +1,158 @@
+"""Compilation: an edit anywhere takes effect at the next start, and compiled and plain Python are the same flight."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ftcc.link
+from ftcc.link.compiled import compiled, copy, fields, fill, instantiate, store
+from tests.swarm import AIRFRAME
+
+REPOSITORY = Path(__file__).parents[2]
+PACKAGES = Path(ftcc.link.__file__).parents[1]
+
+
+def run(arguments: list[str], **environment: str) -> str:
+    finished = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=REPOSITORY,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert finished.returncode == 0, finished.stderr
+    return finished.stdout.strip()
+
+
+class Package:
+    """A copy of the product's sources with a caller of an element, started anew for every question."""
+
+    def __init__(self, folder: Path) -> None:
+        self.root = folder / "ftcc"
+        self.cache = folder / "cache"
+        for name in ("link", "sim", "airside"):
+            shutil.copytree(PACKAGES / name, self.root / name, ignore=shutil.ignore_patterns("__pycache__"))
+        (self.root / "groundside").mkdir()
+        (self.root / "groundside" / "flight_loop.py").write_text('"""None."""\n')
+        (self.root / "airside" / "caller.py").write_text(
+            "from ftcc.airside.elements.neighbours import extrapolated\n"
+            "from ftcc.link.compiled import compiled\n"
+            "@compiled\n"
+            "def law(value, rate, age):\n"
+            "    return extrapolated(value, rate, age, 0.5)\n"
+        )
+        self.element = self.root / "airside" / "elements" / "neighbours.py"
+
+    def start(self) -> tuple[float, int, str]:
+        """Value of the law, how often it had to be compiled, the cache folder in use."""
+        program = (
+            "from ftcc.airside import caller; from ftcc.link.compiled import cache_folder\n"
+            f"assert caller.__file__.startswith({str(self.root)!r}), caller.__file__\n"
+            "value = caller.law(10.0, 2.0, 0.25)\n"
+            "print(value, sum(caller.law.stats.cache_misses.values()), cache_folder)"
+        )
+        answer = run(
+            ["-c", program],
+            PYTHONPATH=str(self.root.parent),
+            FTCC_CACHE_DIR=str(self.cache),
+            NUMBA_DISABLE_JIT="0",
+            PYTHONDONTWRITEBYTECODE="1",
+        ).split()
+        return float(answer[0]), int(answer[1]), answer[2]
+
+
+def test_an_edited_element_takes_effect_at_the_next_start(tmp_path):
+    """numba's own cache would go on flying the old element: only its caller's file counts there."""
+    package = Package(tmp_path)
+    value, compilations, folder = package.start()
+    assert (value, compilations) == (10.5, 1)
+    assert package.start() == (10.5, 0, folder), "an unchanged program is not compiled again"
+
+    source = package.element.read_text()
+    edited = source.replace("return value + rate * min(age, horizon)", "return value - rate * min(age, horizon)")
+    assert edited != source
+    package.element.write_text(edited)
+    value, compilations, other = package.start()
+    assert (value, compilations) == (9.5, 1)
+    assert other != folder
+
+    package.element.write_text(source)
+    assert package.start() == (10.5, 0, folder), "the way back is in the cache still"
+
+
+def test_old_caches_are_cleared_away(tmp_path):
+    base = tmp_path / "compiled"
+    for n in range(9):
+        (base / f"old{n}").mkdir(parents=True)
+        os.utime(base / f"old{n}", (n, n))
+    run(["-c", "import ftcc.link.compiled"], FTCC_CACHE_DIR=str(tmp_path))
+    assert len(list(base.iterdir())) == 6
+    assert not (base / "old3").exists()
+    assert (base / "old8").exists()
+
+
+@pytest.mark.parametrize(("form", "seconds"), [("flight", 1.5), ("monograph", 0.2)])
+def test_a_flight_in_plain_python_has_the_same_bits(form, seconds):
+    """Law, plant, channel, noise and both codecs, of eight UAVs amid loss, noise, a cut, a fault and disturbances."""
+    flight = ["-m", "tests.swarm", form, str(seconds)]
+    assert run(flight, NUMBA_DISABLE_JIT="1") == run(flight, NUMBA_DISABLE_JIT="0")
+
+
+def test_a_template_gives_instances_of_its_own(tmp_path, monkeypatch):
+    (tmp_path / "template_of_a_test.py").write_text(
+        "from ftcc.link.compiled import compiled\n"
+        "element = globals()['element']\n"
+        "@compiled\n"
+        "def twice(x):\n"
+        "    return element(x) + element(x)\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    @compiled
+    def half(x):  # type: ignore[no-untyped-def]
+        return 0.5 * x
+
+    @compiled
+    def square(x):  # type: ignore[no-untyped-def]
+        return x * x
+
+    first = instantiate("template_of_a_test", "half", element=half)
+    second = instantiate("template_of_a_test", "square", element=square)
+    assert first is not second
+    assert (first.twice(3.0), second.twice(3.0)) == (3.0, 18.0)
+    assert instantiate("template_of_a_test", "half", element=square) is first, "a name stands for one instance"
+
+
+@pytest.mark.parametrize("template", ["ftcc.airside.tick", "ftcc.groundside.flight_loop"])
+def test_a_template_says_what_it_is_when_imported_plainly(template):
+    with pytest.raises(ImportError, match="is a template: use"):
+        __import__(template)
+
+
+def test_a_template_that_does_not_exist_is_named():
+    with pytest.raises(ImportError, match="no_such_template"):
+        instantiate("no_such_template", "x")
+
+
+def test_records_and_vectors_are_inverse_to_each_other():
+    vector = np.zeros(20)
+    store(AIRFRAME, vector)
+    assert fields(type(AIRFRAME), vector) == AIRFRAME
+    assert not vector[len(AIRFRAME) :].any()
+
+
+def test_copy_and_fill():
+    target = np.zeros(5)
+    copy(np.array([1.0, 2.0, 3.0]), target)
+    assert target.tolist() == [1.0, 2.0, 3.0, 0.0, 0.0]
+    fill(target, 7.0)
+    assert (target == 7.0).all()

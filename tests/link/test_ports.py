@@ -1,0 +1,122 @@
+"""Blocks of ports: two swarms side by side, and a given port that is in use."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from ftcc.link.mavlink import LOOPBACK
+from ftcc.link.ports import PortBlock, PortError, reserve, runtime_folder
+
+UAVS = (1, 2, 3, 4, 5, 6, 7, 8)
+
+
+@pytest.fixture(autouse=True)
+def runtime(tmp_path, monkeypatch):
+    """Locks of these tests alone."""
+    monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def blocks() -> Iterator[ExitStack]:
+    with ExitStack() as stack:
+        yield stack
+
+
+def held(stack: ExitStack, *arguments: object) -> PortBlock:
+    block = reserve(*arguments)  # type: ignore[arg-type]
+    stack.callback(block.release)
+    return block
+
+
+def all_ports(block: PortBlock) -> list[int]:
+    own = [block.station, *block.viewer]
+    for uav in block.uavs:
+        ports = block.of(uav)
+        own += [ports.vehicle, ports.autopilot, ports.ground, ports.mesh]
+    return own
+
+
+def test_every_use_has_a_port_of_its_own_within_the_block(blocks):
+    block = held(blocks, UAVS)
+    ports = all_ports(block)
+    assert len(set(ports)) == len(ports) == 3 + 4 * len(UAVS)
+    assert min(ports) == block.base
+    assert max(ports) < block.base + block.size
+
+
+def test_blocks_lie_below_the_ephemeral_range(blocks):
+    """Above 32768 the kernel hands out ports to everybody's outgoing connections."""
+    assert min(all_ports(held(blocks, UAVS))) > 1024
+    assert max(all_ports(held(blocks, tuple(range(1, 201))))) < 32768
+
+
+def test_two_swarms_side_by_side_share_no_port(blocks):
+    first, second = held(blocks, UAVS), held(blocks, UAVS)
+    assert not set(all_ports(first)) & set(all_ports(second))
+
+
+def test_a_block_is_held_before_its_first_socket_opens_and_against_other_processes(blocks):
+    block = held(blocks, UAVS)
+    other = "from ftcc.link.ports import reserve; print(reserve((1, 2, 3, 4, 5, 6, 7, 8)).base)"
+    finished = subprocess.run([sys.executable, "-c", other], capture_output=True, check=True, env=dict(os.environ))
+    assert int(finished.stdout) != block.base
+
+
+def test_a_released_block_is_the_first_free_one_again():
+    first = reserve(UAVS)
+    base = first.base
+    first.release()
+    again = reserve(UAVS)
+    assert again.base == base
+    again.release()
+    again.release()  # twice does no harm
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_STREAM], ids=["UDP", "TCP"])
+def test_a_given_block_with_a_port_in_use_is_refused_and_the_port_named(kind):
+    block = reserve(UAVS)
+    base = block.base
+    block.release()
+    taken = block.of(3).mesh
+    with socket.socket(socket.AF_INET, kind) as stranger:
+        stranger.bind((LOOPBACK, taken))
+        if kind == socket.SOCK_STREAM:
+            stranger.listen()
+        with pytest.raises(PortError) as refusal:
+            reserve(UAVS, base)
+        assert f"port {taken} is in use" in str(refusal.value)
+        assert f"{base}-{base + block.size - 1} must be free" in str(refusal.value)
+        assert "leave the option out" in str(refusal.value)
+
+
+def test_without_a_given_port_a_block_with_a_port_in_use_is_passed_over():
+    first = reserve(UAVS)
+    first.release()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.bind((LOOPBACK, first.of(8).vehicle))
+        other = reserve(UAVS)
+        other.release()
+    assert other.base > first.base
+
+
+def test_a_given_block_that_another_swarm_holds_is_refused(blocks):
+    block = held(blocks, UAVS)
+    with pytest.raises(PortError, match=f"port {block.base} is in use"):
+        reserve(UAVS, block.base)
+
+
+def test_a_given_free_block_is_taken_as_it_is(blocks):
+    free = reserve(UAVS)
+    free.release()
+    assert held(blocks, UAVS, free.base).base == free.base
+
+
+def test_the_folder_of_the_locks_is_private_to_the_user():
+    assert runtime_folder().stat().st_mode & 0o077 == 0

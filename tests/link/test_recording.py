@@ -1,0 +1,67 @@
+"""Parts and event logs: what can be read of them, also after the writer was killed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from ftcc.link.recording import Column, EventLog, PartWriter, part_path, read_events, read_part
+
+COLUMNS = (Column("t", "s", "simulated time"), Column("uav", "-", "id"), Column("z", "m", "altitude, up"))
+
+
+def test_a_part_gives_back_its_rows_units_and_meanings(tmp_path: Path) -> None:
+    path = part_path(tmp_path, 3, "vehicle")
+    writer = PartWriter(path, COLUMNS)
+    for k in range(1234):
+        writer.row((k / 100, 3, 1000.0 + k))
+    writer.close()
+    writer.close()
+    table = read_part(path)
+    assert path == tmp_path / "parts" / "3-vehicle.arrows"
+    assert table.column("z").to_pylist() == [1000.0 + k for k in range(1234)]
+    assert set(table.column("uav").to_pylist()) == {3}
+    assert table.schema.field("z").metadata == {b"unit": b"m", b"meaning": b"altitude, up"}
+    assert table.schema.metadata[b"ftcc.schema"] == b"1"
+
+
+@pytest.mark.parametrize("torn", [1, 100, 2000])
+def test_a_part_whose_writer_was_killed_is_whole_up_to_its_last_batch(tmp_path: Path, torn: int) -> None:
+    path = part_path(tmp_path, 1, "vehicle")
+    writer = PartWriter(path, COLUMNS)
+    for k in range(500):
+        writer.row((k / 100, 1, math.pi * k))
+    writer.flush()
+    whole = path.stat().st_size
+    for k in range(500, 700):
+        writer.row((k / 100, 1, math.pi * k))
+    writer.flush()
+    with path.open("r+b") as file:
+        file.truncate(whole + torn)
+    table = read_part(path)
+    assert table.column("z").to_pylist() == [math.pi * k for k in range(500)]
+
+
+def test_a_part_without_a_schema_is_no_part(tmp_path: Path) -> None:
+    path = tmp_path / "1-vehicle.arrows"
+    path.write_bytes(b"")
+    assert read_part(path) is None
+
+
+def test_events_come_back_in_order_of_simulated_time_without_a_torn_last_line(tmp_path: Path) -> None:
+    path = tmp_path / "events.jsonl"
+    log = EventLog(path)
+    log.write(80.0, "elevator fault", 1, "warning")
+    log.write(0.5, "all ready", late=0)
+    log.close()
+    with path.open("a") as file:
+        file.write('{"t": 90.0, "te')
+    events = read_events(path)
+    assert [(event["t"], event["uav"], event["severity"], event["text"]) for event in events] == [
+        (0.5, None, "info", "all ready"),
+        (80.0, 1, "warning", "elevator fault"),
+    ]
+    assert events[0]["late"] == 0
+    assert read_events(tmp_path / "none.jsonl") == []

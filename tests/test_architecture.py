@@ -1,0 +1,171 @@
+"""Who may import whom, what a child process loads, and that truth never reaches control."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ftcc.airside.flight_path import Own, decode_state
+from ftcc.airside.scheme import Heard
+from ftcc.airside.schemes import find
+from ftcc.link.mavlink import float_array
+from tests.airside.autopilot_bench import Bench, forged
+from tests.swarm import TRIM, autopilot, vehicle
+
+REPOSITORY = Path(__file__).parents[1]
+
+MAY_IMPORT = {
+    "link": {"link"},
+    "sim": {"sim", "link"},
+    "airside": {"airside", "link"},
+    "groundside": {"groundside", "airside", "sim", "link"},
+}
+"""Our folders: who may import whom."""
+
+ONLY_ON_THE_GROUND = {"pydantic", "typer", "rich", "rerun", "matplotlib"}
+"""Libraries that no child process imports, at whatever moment."""
+
+NOT_BEFORE_THE_FORK = ONLY_ON_THE_GROUND | {"zenoh", "pyarrow"}
+
+
+def sources(folder: str) -> list[Path]:
+    return sorted((REPOSITORY / folder).rglob("*.py"))
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and full name of every module that a file imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: a relative import hides what is imported"
+            assert node.module is not None
+            yield node.lineno, node.module
+            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def named(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and name of every module of ours that a file names in a string, as `instantiate` and importlib take them."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            parts = node.value.split(".")
+            if parts[0] == "ftcc" and len(parts) > 1 and parts[1] in MAY_IMPORT:
+                yield node.lineno, node.value
+
+
+@pytest.mark.parametrize("folder", MAY_IMPORT)
+def test_import_table(folder):
+    files = sources(folder)
+    assert files
+    broken = []
+    for path in files:
+        for line, name in (*imports(path), *named(path)):
+            parts = name.split(".")
+            if parts[0] == "tests" or parts[0] in MAY_IMPORT:
+                broken.append(f"{path}:{line} imports {name}, which is not installed under that name")
+            elif parts[0] == "ftcc" and (len(parts) == 1 or parts[1] not in MAY_IMPORT[folder]):
+                broken.append(f"{path}:{line} imports {name}")
+    assert not broken, "\n".join(broken)
+
+
+@pytest.mark.parametrize("folder", ["link", "sim", "airside"])
+def test_libraries_of_the_ground_stay_there(folder):
+    found = [
+        f"{path}:{line} imports {name}"
+        for path in sources(folder)
+        for line, name in imports(path)
+        if name.split(".")[0] in ONLY_ON_THE_GROUND
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_one_module_imports_numba():
+    """It sets the cache folder first."""
+    found = {
+        path.relative_to(REPOSITORY).as_posix()
+        for folder in MAY_IMPORT
+        for path in sources(folder)
+        for _, name in imports(path)
+        if name.split(".")[0] == "numba"
+    }
+    assert found == {"link/compiled.py"}
+
+
+def test_what_is_forked_has_loaded_neither_mesh_nor_files_nor_ground():
+    """A child of a process that had opened Zenoh never sends; pyarrow and rerun start threads."""
+    program = (
+        "import sys, threading; import ftcc.groundside.preload\n"
+        f"print(*[name for name in {sorted(NOT_BEFORE_THE_FORK)!r} if name in sys.modules])\n"
+        "assert threading.active_count() == 1, threading.enumerate()\n"
+        "import psutil; assert not psutil.Process().net_connections(), 'a socket is open'"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", program],
+        env={name: value for name, value in os.environ.items() if name != "FTCC_PRELOAD_SCHEME"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout.split() == []
+
+
+# Truth never reaches control.
+
+
+def test_nothing_on_board_names_the_simulator():
+    """It neither imports it, nor names a module of it in a string, nor knows the name of its message to the station."""
+    for path in sources("airside"):
+        assert not any(name.split(".")[:2] == ["ftcc", "sim"] for _, name in (*imports(path), *named(path))), path
+        assert not any(
+            isinstance(node, ast.Constant) and node.value == "truth"
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        ), f"{path} names the message that carries the truth to the station"
+
+
+@pytest.fixture
+def runtime(tmp_path, monkeypatch):
+    monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path / "runtime"))
+
+
+def test_an_autopilot_acts_on_the_messages_and_on_nothing_else(tmp_path, runtime):
+    """Forged states, in which no equation of motion holds, are answered by exactly the law applied to them."""
+    scheme, spec = find("containment"), autopilot(1)
+    law, gains = scheme.module, scheme.gains("flight", {})
+    random = np.random.default_rng(1)
+    nobody = Heard(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
+    travel = np.array(vehicle().travel)
+    state = None
+    with closing(Bench(tmp_path, 19)) as alone, alone as bench:
+        for tick in range(20):
+            drawn = random.uniform([995.0, 26.0, -0.1, -0.1, -0.3], [1005.0, 34.0, 0.1, 0.2, 0.3])
+            message, controls = forged(*drawn), np.float32(random.uniform(-0.5, 0.5, 4)).astype(np.float64)
+            answered = bench.answer(tick, message, controls)
+
+            seen = np.zeros(len(Own._fields))
+            decode_state(message, tick / 100, controls * travel, seen)
+            own = Own(*seen.tolist())
+            assert (own.z, own.V) == pytest.approx((drawn[0], drawn[1]), abs=1e-3)
+            state = state or law.start(own, nobody, spec.mission, spec.model, gains)
+            state, shown = law.step(state, own, nobody, spec.mission, spec.model, gains, 0.01)
+            expected = np.float32([0.0, shown.elevator / 0.7, 0.0, shown.thrust / 40.0])
+            assert np.array_equal(answered, expected), tick
+
+
+def test_truth_sent_to_an_autopilot_by_mistake_changes_nothing(tmp_path, runtime):
+    level = forged(1000.0, 30.0, 0.0, 0.0322, 0.0)
+    force = np.array(TRIM) / np.array([1.0, 0.7, 1.0, 40.0])
+
+    def answers(folder: str, *more: object) -> list[list[float]]:
+        with closing(Bench(tmp_path / folder, 9)) as alone, alone as bench:
+            return [bench.answer(tick, level, force, *more).tolist() for tick in range(10)]
+
+    assert answers("with", float_array(0, "truth", [1.0] * 40)) == answers("without")
