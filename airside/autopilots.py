@@ -34,7 +34,17 @@ from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, copy, instantiate
 from ftcc.link.timing import Timing
 
-__all__ = ["Autopilots", "LinkEvents", "build", "lead", "link_events", "sense", "sense_and_refer", "set_links", "tick_of"]
+__all__ = [
+    "Autopilots",
+    "LinkEvents",
+    "build",
+    "lead",
+    "link_events",
+    "sense",
+    "sense_and_refer",
+    "set_links",
+    "tick_of",
+]
 
 
 X = Reference._fields.index("x")
@@ -119,7 +129,8 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     profiles = [profile_arrays(spec.profile, timing.period) if spec.profile else None for spec in specs]
     rows = max([1] + [len(pair[1]) for pair in profiles if pair])
     commands = np.full((k, rows, 3), math.inf)
-    triggers = np.full((k, max(1, *(len(s.profile.triggers) if s.profile else 0 for s in specs)), TRIGGER_COLUMNS), math.inf)
+    waits = max([1] + [len(spec.profile.triggers) for spec in specs if spec.profile])
+    triggers = np.full((k, waits, TRIGGER_COLUMNS), math.inf)
     parameters = np.zeros((k, PROFILE_PARAMETERS))
     states = np.zeros((k, PROFILE_STATES))
     for i, (spec, pair) in enumerate(zip(specs, profiles, strict=True)):
@@ -198,9 +209,9 @@ def set_links(events, inbox, now_us):  # type: ignore[no-untyped-def]
 
 @compiled
 def sense(autopilots, i, message, reported, now_us):  # type: ignore[no-untyped-def]
-    """Own state of UAV ``i`` from its vehicle's message (13,) and the command that it reports in force, as fractions (4,).
+    """Own state of UAV ``i`` from its vehicle's message (13,) and the command that it reports in force (4,).
 
-    ``reported`` is overwritten with the command in rad and N.
+    ``reported`` comes as fractions of the travel and is overwritten in rad and N.
     """
     decode_command(reported, autopilots.travel[i], reported)
     decode_state(message, now_us / 1e6, reported, autopilots.own[i])
@@ -216,7 +227,7 @@ def sense_and_refer(autopilots, active, messages, reported, now_us, period_us): 
 
 @compiled
 def _position_of(autopilots, inbox, i, edge):  # type: ignore[no-untyped-def]
-    """Present forward position of the leader behind in-edge ``edge``, carried on by its speed; nan before its first record."""
+    """Present forward position of the leader behind in-edge ``edge``, carried on by its speed; nan if never heard."""
     if edge < 0 or inbox.valid[i, edge] == 0.0:
         return math.nan
     position = math.nan

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from ftcc.airside.scheme import Flight, Problem
@@ -10,11 +10,11 @@ from ftcc.airside.scheme import Flight, Problem
 __all__ = ["above_leaders_climb", "largest_degree", "positive", "stable_in_steps"]
 
 
-def positive(gains: Any, names: Iterable[str]) -> list[Problem]:
-    """Every gain of ``names`` must be > 0."""
+def positive(gains: Any, names: str) -> list[Problem]:
+    """Every gain of ``names`` (separated by spaces) must be > 0."""
     return [
         Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
-        for name in names
+        for name in names.split()
         if not getattr(gains, name) > 0.0
     ]
 

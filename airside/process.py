@@ -110,6 +110,8 @@ class Crew:
         self.states: list[collections.deque[tuple[int, np.ndarray, np.ndarray]]] = [collections.deque() for _ in specs]
         self.done = np.full(k, -1, np.int64)
         """Last tick of each autopilot."""
+        self.ending: set[int] = set()
+        """Whose aircraft is lost."""
         self.links = [{n.uav: _Link() for n in spec.neighbours} for spec in specs]
         self.edge = [{n.uav: e for e, n in enumerate(spec.neighbours)} for spec in specs]
         self.acknowledged: dict[int, int] = {}
@@ -203,6 +205,7 @@ class Crew:
                     one[:] = 0
                     one[i] = 1
                     self.tick(tick, one)
+            self.end_the_lost()
             if (self.done[self.alive == 1] >= self.timing.ticks).all():
                 return
 
@@ -351,7 +354,7 @@ class Crew:
         while messages:
             if messages[0].get_type() == "HEARTBEAT":
                 if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
-                    self.end(i)
+                    self.ending.add(i)
                 messages = messages[1:]
                 continue
             state, controls = np.zeros(13), np.zeros(4)
@@ -390,6 +393,7 @@ class Crew:
 
     def missing_state(self) -> str:
         """Whose state is still awaited, as text; empty if nobody's."""
+        self.end_the_lost()
         for i in _those(self.alive):
             if not self.states[i]:
                 return f"the state of UAV {self.specs[i].uav}"
@@ -431,6 +435,13 @@ class Crew:
             if sender not in self.index and not self.over(sender, link)
         ]
         return min(newest, default=_NOTHING_MORE)
+
+    def end_the_lost(self) -> None:
+        """UAVs whose aircraft is lost end once the states before that are worked off."""
+        for i in list(self.ending):
+            if not self.states[i]:
+                self.ending.discard(i)
+                self.end(i)
 
     def give_up(self, i: int) -> None:
         """The law's command is not finite: tell the vehicle, and end."""

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 __all__ = ["Dashboard"]
 
 _APPLICATION = "ftcc"
-_TO_VIEWER = 0.2
-"""Longest wait of logged data in the process, on their way to the viewer, s."""
+_TO_VIEWER = 1.0
+"""Longest wait of logged data in the process on their way to a viewer that lags, s; else they go frame by frame."""
 _TO_FILE = 2.0
-"""The same on their way to the recording, s: what a killed run loses.
+"""Longest wait of logged data on their way to the recording, s: what a killed run loses.
 
 Few large pieces make a small file and a small index of it, which stays in memory until the file is closed.
 """

@@ -123,6 +123,7 @@ def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Arra
         if isinstance(node, ast.Name):
             return values[node.id]
         assert isinstance(node, ast.Constant)
+        assert isinstance(node.value, (int, float))
         return np.float64(node.value)
 
     with np.errstate(all="ignore"):

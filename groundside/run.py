@@ -52,7 +52,7 @@ def new_folder(name: str, out: str | Path | None = None) -> Path:
     if (folder / "scenario.toml").exists():
         raise RunError(f"--out {folder}: already holds a run; give a folder that is empty or does not exist")
     try:
-        (folder / "parts").mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise PermissionError(f"no permission to write into {folder}")
     except OSError as error:

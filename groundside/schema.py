@@ -9,18 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-__all__ = [
-    "AirframeSheet",
-    "ChannelFields",
-    "Claim",
-    "DisturbanceFields",
-    "EdgeFields",
-    "FaultFields",
-    "LeaderFields",
-    "LinkEventFields",
-    "Plan",
-    "Start",
-]
+__all__ = ["AirframeSheet", "ChannelFields", "Claim", "LeaderFields", "LinkEventFields", "Plan", "Start", "fields_of"]
 
 Id = Annotated[int, Field(ge=1, le=200)]
 """MAVLink system id of a UAV."""
@@ -33,7 +22,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 class Strict(BaseModel):
     """Fields that are not listed, nan and inf are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class AirframeSheet(Strict):

@@ -218,6 +218,9 @@ class Viewer:
         sent = 0
         while (entries := self._frames.get()) is not None:
             write(stream, entries)
+            if self._frames.empty():
+                # Whole frames: cut in the middle, some aircraft would be drawn a moment behind the others.
+                stream.flush(timeout_sec=0.0)
             sent += 1
             if sent % _UNREAD == 0:
                 self._wait_for_reader(stream)

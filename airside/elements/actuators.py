@@ -11,13 +11,13 @@ __all__ = ["lead_filter", "leading_command", "modelled_position"]
 
 @compiled
 def modelled_position(position, in_force, lag, h):  # type: ignore[no-untyped-def]
-    """Position of a first-order actuator of bandwidth ``lag`` (rad/s) after ``h`` seconds under the command in force."""
+    """Position of a first-order actuator of bandwidth ``lag`` (rad/s) after ``h`` seconds of the command in force."""
     return in_force + (position - in_force) * math.exp(-lag * h)
 
 
 @compiled
 def leading_command(position, wanted, lag, target_lag):  # type: ignore[no-untyped-def]
-    """The command that moves an actuator of bandwidth ``lag`` from ``position`` to ``wanted`` as one of ``target_lag`` would."""
+    """The command that moves an actuator of bandwidth ``lag`` to ``wanted`` as one of bandwidth ``target_lag``."""
     return position + (target_lag / lag) * (wanted - position)
 
 

@@ -55,7 +55,7 @@ def high_gain_observer(value, rate, target, epsilon, damping):  # type: ignore[n
 
 @compiled
 def sliding_mode_differentiator(value, derivative, target, mu1, mu2):  # type: ignore[no-untyped-def]
-    """First-order sliding-mode differentiator of ``target`` (Levant), eq. (6.42), the lost dot of its second line restored.
+    """First-order sliding-mode differentiator of ``target`` (Levant), eq. (6.42) with the lost dot of its second line.
 
     value' = -mu1 |value - target|^0.5 sign(value - target) + derivative; derivative' = -mu2 sign(value - target). It
     follows exactly, after a finite time, where abs(target'') < mu2.

@@ -1,4 +1,4 @@
-"""Prescribed performance: a tube that an error must not leave, and the error transformed so that its wall is at infinity."""
+"""Prescribed performance: a tube that an error must not leave, and the error transformed so that its walls are far."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
 
-__all__ = ["EDGE", "performance_tube", "performance_transform"]
+__all__ = ["EDGE", "performance_transform", "performance_tube"]
 
 EDGE = 0.98
 """The transform sees at most this share of the tube: beyond it, up to and outside of the wall, it stays finite."""
@@ -15,7 +15,7 @@ EDGE = 0.98
 
 @compiled
 def performance_tube(t, first, last, decay):  # type: ignore[no-untyped-def]
-    """Half-width of the tube ``t`` seconds after its start and its rate: (first - last) exp(-decay t) + last, eq. (3.25)."""
+    """Half-width (first - last) exp(-decay t) + last of the tube ``t`` seconds after its start; its rate. (3.25)"""
     excess = (first - last) * math.exp(-decay * t)
     return excess + last, -decay * excess
 

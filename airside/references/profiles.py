@@ -213,7 +213,7 @@ def _cosine(parameters, time):  # type: ignore[no-untyped-def]
 
 @compiled
 def _climb_filtered(parameters, state, altitude, falling, period):  # type: ignore[no-untyped-def]
-    """Advance the altitude filter, its rate kept such that the climb, less the cosine's ``falling``, obeys the limit."""
+    """Advance the altitude filter; its rate less that of the cosine (``falling``) obeys the limit."""
     before = state[_Z]
     state[_Z], state[_Z_RATE] = _filtered(parameters, _Z_PHI, state[_Z], state[_Z_RATE], altitude)
     limit = parameters[_CLIMB_LIMIT]
@@ -272,7 +272,7 @@ def refer(parameters, commands, triggers, state, reference, seen, now_us, period
 
 
 def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> dict[int, Any]:
-    """The leaders' profiles over a flight, by id: arrays (n, 7) in the order of `Reference`; all leaders hear each other."""
+    """The leaders' profiles over a flight, by id: arrays (n, 7) in the order of `Reference`; all hear each other."""
     period_us = round(period * 1e6)
     count = int(duration / period) + 1
     uavs = list(profiles)

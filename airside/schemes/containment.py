@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, positive, stable_in_steps
 from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
 from ftcc.airside.elements.neighbours import disagreement
 from ftcc.airside.elements.observers import disturbance_observer_rate, sliding_mode_observer
@@ -190,9 +191,7 @@ def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[
     zeta2 = gains.auxiliary * s.zeta2
 
     # Distributed observer (5.12) and shaper.
-    total, weights, rates = disagreement(
-        s.zhat, heard, ahead, gains.horizon, gains.z_start, gains.in_flight
-    )
+    total, weights, rates = disagreement(s.zhat, heard, ahead, gains.horizon, gains.z_start, gains.in_flight)
     zhat_rate, slope = sliding_mode_observer(total, gains.beta1, gains.beta2, gains.phi)
     if gains.shaper > 0.0:
         z_ref, v_ref, a_ref = s.z_r, s.v_r, s.a_r
@@ -323,25 +322,14 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = []
-    positive = ("k11", "k12", "k21", "k31", "k41", "k51", "k22", "k42", "k52", "e1", "e2", "l1", "l2", "beta1", "phi")
-    for name in positive:
-        if getattr(gains, name) <= 0.0:
-            problems.append(Problem(True, f"gain {name} = {getattr(gains, name)}: must be > 0"))
+    problems = positive(gains, "k11 k12 k21 k31 k41 k51 k22 k42 k52 e1 e2 l1 l2 beta1 phi")
     if gains.substeps < 1.0 or gains.substeps != int(gains.substeps):
         return [*problems, Problem(True, f"gain substeps = {gains.substeps}: must be a whole number >= 1")]
-    if gains.beta2 <= flight.leader_climb:
-        problems.append(
-            Problem(
-                True,
-                f"gain beta2 = {gains.beta2} m/s: must exceed the leaders' largest climb rate, "
-                f"{flight.leader_climb:.3f} m/s (Theorem 5.1)",
-            )
-        )
+    problems += above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")
     if flight.leader_speed_varies:
         problems.append(Problem(True, "the leaders' speed must be constant: followers know it as a mission constant"))
     h = flight.period / gains.substeps
-    degree = max((sum(flight.graph.weights.get((i, j), 0.0) for j in flight.graph.uavs)) for i in flight.graph.followers)
+    degree = largest_degree(flight)
     rates = {
         "e1": 1.0 / max(gains.e1, 1e-9),
         "e2": 1.0 / max(gains.e2, 1e-9),
@@ -349,9 +337,5 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
         "k42": gains.k42,
         "k41": gains.k41,
     }
-    for name, rate in rates.items():
-        if rate * h >= 2.0:
-            problems.append(
-                Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {h * 1e3:g} ms")
-            )
+    problems += stable_in_steps(rates, h)
     return problems

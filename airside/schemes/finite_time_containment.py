@@ -31,7 +31,7 @@ from ftcc.airside.elements.observers import finite_time_observer
 from ftcc.airside.elements.saturation import squared_auxiliary_step
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, clip
-from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -167,42 +167,25 @@ class Output(NamedTuple):
     P4: float
 
 
-_MOTION = (
-    Q("x", "m", "forward position"),
-    Q("x_dot", "m/s", "forward speed"),
-    Q("z", "m", "altitude"),
-    Q("z_dot", "m/s", "climb rate"),
-)
+_S = tuple(quantities(State).values())
 SHARED = {
-    "follower": (
-        Q("x_hat", "m", "estimated position reference"),
-        Q("Vx_hat", "m/s", "its rate"),
-        Q("z_hat", "m", "estimated altitude reference"),
-        Q("Vz_hat", "m/s", "its rate"),
+    "follower": _S[:4],
+    "leader": (
+        Q("x", "m", "forward position"),
+        Q("x_dot", "m/s", "forward speed"),
+        Q("z", "m", "altitude"),
+        Q("z_dot", "m/s", "climb rate"),
     ),
-    "leader": _MOTION,
 }
 SIGNALS = (
-    Q("x_hat", "m", "estimated position reference"),
-    Q("Vx_hat", "m/s", "estimated forward speed"),
-    Q("z_hat", "m", "estimated altitude reference"),
-    Q("Vz_hat", "m/s", "estimated climb rate"),
+    *_S[:4],
     Q("S1", "m", "position tracking error"),
     Q("S2", "m/s", "speed error"),
     Q("S3", "m", "altitude tracking error"),
     Q("S4", "rad", "flight-path error"),
     Q("S5", "rad", "angle-of-attack error"),
     Q("S6", "rad/s", "pitch-rate error"),
-    Q("chi11", "-", "adapted gain of the speed, network"),
-    Q("chi12", "-", "adapted gain of the speed"),
-    Q("chi21", "-", "adapted gain of the flight path, network"),
-    Q("chi22", "-", "adapted gain of the flight path"),
-    Q("chi31", "-", "adapted gain of the angle of attack, network"),
-    Q("chi32", "-", "adapted gain of the angle of attack"),
-    Q("chi41", "-", "adapted gain of the pitch rate, network"),
-    Q("chi42", "-", "adapted gain of the pitch rate"),
-    Q("eta1", "-", "auxiliary system of the thrust"),
-    Q("eta2", "-", "auxiliary system of the elevator"),
+    *_S[4:14],
     Q("thrust_wanted", "N", "thrust command before saturation"),
     Q("elevator_wanted", "rad", "elevator command before saturation"),
 )
@@ -272,9 +255,7 @@ def _evaluate(s, own, V, gamma, alpha, q, model, g):  # type: ignore[no-untyped-
         + g.auxiliary * g.k62 * s.eta2
     )
     u = clip(u_wanted, -model.elevator_max, -model.elevator_min)
-    return Output(
-        thrust, -u, thrust_wanted, -u_wanted, S1, S2, S3, S4, S5, S6, x2d, x4d, x5d, x6d, P1, P2, P3, P4
-    )
+    return Output(thrust, -u, thrust_wanted, -u_wanted, S1, S2, S3, S4, S5, S6, x2d, x4d, x5d, x6d, P1, P2, P3, P4)
 
 
 @compiled
@@ -362,40 +343,13 @@ def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elev
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: estimates at the own motion, filters at the present command and attitude."""
     V_x = own.V * math.cos(own.gamma)
-    return State(
-        x_hat=own.x,
-        Vx_hat=V_x,
-        z_hat=own.z,
-        Vz_hat=own.V * math.sin(own.gamma),
-        c11=0.0,
-        c12=0.0,
-        c21=0.0,
-        c22=0.0,
-        c31=0.0,
-        c32=0.0,
-        c41=0.0,
-        c42=0.0,
-        eta1=0.01,
-        eta2=0.01,
-        u1_f=own.thrust,
-        u1_f_rate=0.0,
-        alpha_f=own.alpha,
-        alpha_f_rate=0.0,
-        u2_f=-own.elevator,
-        u2_f_rate=0.0,
-        p2=V_x,
-        d2=0.0,
-        p4=0.0,
-        d4=0.0,
-        p5=0.0,
-        d5=0.0,
-        p6=0.0,
-        d6=0.0,
-        V_before=own.V,
-        gamma_before=own.gamma,
-        alpha_before=own.alpha,
-        q_before=own.q,
-    )
+    estimates = (own.x, V_x, own.z, own.V * math.sin(own.gamma))
+    adapted = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    auxiliary = (0.01, 0.01)
+    low_passes = (own.thrust, 0.0, own.alpha, 0.0, -own.elevator, 0.0)
+    differentiators = (V_x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    before = (own.V, own.gamma, own.alpha, own.q)
+    return State(*estimates, *adapted, *auxiliary, *low_passes, *differentiators, *before)
 
 
 @compiled
@@ -432,39 +386,16 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
     """`SIGNALS` for the instant of ``state``."""
-    return (
-        state.x_hat,
-        state.Vx_hat,
-        state.z_hat,
-        state.Vz_hat,
-        output.S1,
-        output.S2,
-        output.S3,
-        output.S4,
-        output.S5,
-        output.S6,
-        state.c11,
-        state.c12,
-        state.c21,
-        state.c22,
-        state.c31,
-        state.c32,
-        state.c41,
-        state.c42,
-        state.eta1,
-        state.eta2,
-        output.thrust_wanted,
-        output.elevator_wanted,
-    )
+    errors = (output.S1, output.S2, output.S3, output.S4, output.S5, output.S6)
+    return (*state[:4], *errors, *state[4:14], output.thrust_wanted, output.elevator_wanted)
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(
         gains,
-        ["beta1", "beta2", "beta3", "beta4", "kappa", "k11", "k21", "k22", "k31", "k41", "k51", "k61", "k62", "z11", "z12"]
-        + ["z21", "z22", "z31", "z32", "z41", "z42", "g11", "g12", "g21", "g22", "g31", "g32", "g41", "g42", "h11", "h12"]
-        + ["h21", "h22", "h31", "h32", "h41", "h42", "nu1", "nu2", "mu1", "mu2", "width", "low_pass"],
+        "beta1 beta2 beta3 beta4 kappa k11 k21 k22 k31 k41 k51 k61 k62 z11 z12 z21 z22 z31 z32 z41 z42 g11 g12 g21 g22 "
+        "g31 g32 g41 g42 h11 h12 h21 h22 h31 h32 h41 h42 nu1 nu2 mu1 mu2 width low_pass",
     )
     for name in ("a", "r"):
         if not 0.0 < getattr(gains, name) < 1.0:

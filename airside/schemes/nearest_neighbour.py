@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
+from ftcc.airside.conditions import positive, stable_in_steps
 from ftcc.airside.elements.actuators import leading_command, modelled_position
 from ftcc.airside.elements.filters import first_order_rate, second_order_reference_step
 from ftcc.airside.elements.neighbours import weighted_average
@@ -31,7 +32,7 @@ from ftcc.airside.elements.observers import disturbance_observer_rate
 from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, airspeed_model, clip, flight_path_model, pitch_rate_model
-from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -58,17 +59,17 @@ class Gains(NamedTuple):
     auxiliary: Annotated[float, Q("auxiliary", "-", "1: auxiliary systems on", 1.0)]
     accelerometer: Annotated[float, Q("accelerometer", "-", "1: the acceleration sent is an ideal measurement", 0.0)]
     gamma_limit: Annotated[float, Q("gamma_max", "rad", "limit of the flight-path command, 0: off (not in paper)", 0.0)]
-    alpha_limit: Annotated[float, Q("alpha_max", "rad", "limit of the pitch command about gamma, 0: off (not in paper)", 0.0)]
+    alpha_limit: Annotated[float, Q("alpha_max", "rad", "limit of theta_d - gamma, 0: off (not in paper)", 0.0)]
     q_limit: Annotated[float, Q("q_max", "rad/s", "limit of the pitch-rate command, 0: off (not in paper)", 0.0)]
     filter_frequency: Annotated[float, Q("w_r", "rad/s", "filter of the averages, 0: off (not in paper)", 0.0)]
     filter_damping: Annotated[float, Q("zeta_r", "-", "its damping (not in paper)", 1.5)]
     oldest: Annotated[float, Q("horizon", "s", "age at which a neighbour is left out (not in paper)", 2.0)]
-    lead: Annotated[float, Q("lead", "rad/s", "bandwidth that the actuators appear to have, 0: off (not in paper)", 0.0)]
+    lead: Annotated[float, Q("lead", "rad/s", "apparent actuator bandwidth, 0: off (not in paper)", 0.0)]
     rate_filter: Annotated[float, Q("T_a", "s", "low-pass of the acceleration sent, 0: off (not in paper)", 0.0)]
-    V_start: Annotated[float, Q("V_start", "m/s", "reference before the first neighbour is heard", 30.0)]
-    z_start: Annotated[float, Q("z_start", "m", "reference before the first neighbour is heard", 1000.0)]
-    z_rate_start: Annotated[float, Q("z_rate_start", "m/s", "and its rate", 0.0)]
-    in_flight: Annotated[float, Q("in_flight", "-", "1: before the first neighbour is heard, the own speed and altitude", 0.0)]
+    V_start: Annotated[float, Q("V_start", "m/s", "neighbours' mean until the first is heard", 30.0)]
+    z_start: Annotated[float, Q("z_start", "m", "neighbours' mean until the first is heard", 1000.0)]
+    z_rate_start: Annotated[float, Q("z_rate_start", "m/s", "rate of z_start", 0.0)]
+    in_flight: Annotated[float, Q("in_flight", "-", "1: the own speed and altitude in their place", 0.0)]
 
 
 class State(NamedTuple):
@@ -92,7 +93,7 @@ class State(NamedTuple):
     elevator: Annotated[float, Q("a_e", "rad", "modelled elevator position")]
     V_rate_f: Annotated[float, Q("a_f", "m/s^2", "low-pass of the acceleration sent")]
     V_before: Annotated[float, Q("V_before", "m/s", "airspeed at the tick before")]
-    V_rate_before: Annotated[float, Q("a_before", "m/s^2", "modelled acceleration at the tick before")]
+    known_before: Annotated[float, Q("a_before", "m/s^2", "modelled acceleration at the tick before")]
     begun: Annotated[float, Q("begun", "-", "0 before the first tick, 1 until a neighbour is heard, then 2")]
 
 
@@ -108,36 +109,32 @@ class Output(NamedTuple):
     d1_hat: float
     d2_hat: float
     lumped_hat: float
+    V_id: float
+    z_id: float
+    V_rate: float
+    known_V_rate: float
+    thrust_position: float
+    elevator_position: float
     gamma_bar: float
     theta_bar: float
-    x1_rate: float
-    x2_rate: float
-    x3_rate: float
     gamma_d_rate: float
     theta_d_rate: float
     q_d_rate: float
+    x1_rate: float
+    x2_rate: float
+    x3_rate: float
     xi1_rate: float
     xi2_rate: float
-    known_V_rate: float
-    V_rate: float
-    V_id: float
-    z_id: float
 
 
-SHARED = {
-    "follower": (
-        Q("V", "m/s", "airspeed"),
-        Q("V_dot", "m/s^2", "modelled acceleration"),
-        Q("z", "m", "altitude"),
-        Q("z_dot", "m/s", "climb rate"),
-    ),
-    "leader": (
-        Q("V", "m/s", "airspeed"),
-        Q("V_dot", "m/s^2", "acceleration"),
-        Q("z", "m", "altitude"),
-        Q("z_dot", "m/s", "climb rate"),
-    ),
-}
+_MOTION = (
+    Q("V", "m/s", "airspeed"),
+    Q("V_dot", "m/s^2", "acceleration; a follower's is modelled"),
+    Q("z", "m", "altitude"),
+    Q("z_dot", "m/s", "climb rate"),
+)
+SHARED = {"follower": _MOTION, "leader": _MOTION}
+_S = quantities(State)
 SIGNALS = (
     Q("V_id", "m/s", "neighbours' mean speed"),
     Q("z_id", "m", "neighbours' mean altitude"),
@@ -145,14 +142,10 @@ SIGNALS = (
     Q("z_r", "m", "altitude reference that the law tracks"),
     Q("S1", "m/s", "speed tracking error"),
     Q("S2", "m", "altitude tracking error"),
-    Q("gamma_d", "rad", "commanded flight-path angle"),
-    Q("theta_d", "rad", "commanded pitch"),
-    Q("q_d", "rad/s", "commanded pitch rate"),
+    *(_S[name] for name in ("gamma_d", "theta_d", "q_d", "xi1", "xi2")),
     Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
     Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
     Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
-    Q("xi1", "m/s", "auxiliary system of the thrust"),
-    Q("xi2", "rad/s", "auxiliary system of the elevator"),
     Q("thrust_wanted", "N", "thrust before saturation"),
     Q("elevator_wanted", "rad", "elevator before saturation"),
 )
@@ -178,8 +171,8 @@ _LEAST_AIRSPEED = 5.0
 
 
 @compiled
-def _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains):  # type: ignore[no-untyped-def]
-    """Eqs. (4.16)-(4.50) for the states ``s`` as they stand and a reference in speed and altitude."""
+def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt):  # type: ignore[no-untyped-def]
+    """Eqs. (4.16)-(4.50) for the states ``s`` as they stand and a reference (V_d, z_d) in speed and altitude."""
     V = own.V
     divisor = max(V, _LEAST_AIRSPEED)
     alpha = own.theta - own.gamma
@@ -218,57 +211,63 @@ def _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains):  # type: igno
     elevator_wanted = (-gains.k52 * S5 - f_q - lumped_hat + q_d_rate) / g_q
     elevator = clip(elevator_wanted, model.elevator_min, model.elevator_max)
 
+    # The commands that move lagging actuators, from where they will be when the commands come into force; the observers
+    # see where the actuators are.
     acting_thrust, acting_elevator = thrust, elevator
+    sent_thrust, sent_elevator = thrust, elevator
+    thrust_position, elevator_position = s.thrust, s.elevator
     if gains.lead > 0.0 and model.lag > 0.0:
         acting_thrust, acting_elevator = s.thrust, s.elevator
-    return _Evaluation(
-        thrust,
-        elevator,
+        thrust_position = modelled_position(s.thrust, own.thrust, model.lag, dt)
+        elevator_position = modelled_position(s.elevator, own.elevator, model.lag, dt)
+        sent_thrust = leading_command(thrust_position, thrust, model.lag, gains.lead)
+        sent_elevator = leading_command(elevator_position, elevator, model.lag, gains.lead)
+        sent_thrust = clip(sent_thrust, model.thrust_min, model.thrust_max)
+        sent_elevator = clip(sent_elevator, model.elevator_min, model.elevator_max)
+
+    # The acceleration that the neighbours are told.
+    known_V_rate = f_v + g_v * acting_thrust
+    V_rate = known_V_rate + d1_hat
+    if gains.accelerometer > 0.0:
+        V_rate = known_V_rate + ((own.V - s.V_before) / dt - s.known_before)
+    elif gains.rate_filter > 0.0:
+        V_rate = s.V_rate_f
+    return Output(
+        sent_thrust,
+        sent_elevator,
         thrust_wanted,
         elevator_wanted,
-        gamma_bar,
-        theta_bar,
-        q_bar,
+        S1,
+        S2,
         d1_hat,
         d2_hat,
         lumped_hat,
-        disturbance_observer_rate(gains.k11, S1, s.x1, f_v + g_v * acting_thrust, V_d_rate),
-        disturbance_observer_rate(gains.k31, S3, s.x2, f_g + g_g * own.theta, gamma_d_rate),
-        disturbance_observer_rate(gains.k51, S5, s.x3, f_q + g_q * acting_elevator, q_d_rate),
+        V_id,
+        z_id,
+        V_rate,
+        known_V_rate,
+        thrust_position,
+        elevator_position,
+        gamma_bar,
+        theta_bar,
         gamma_d_rate,
         theta_d_rate,
         q_d_rate,
+        disturbance_observer_rate(gains.k11, S1, s.x1, f_v + g_v * acting_thrust, V_d_rate),
+        disturbance_observer_rate(gains.k31, S3, s.x2, f_g + g_g * own.theta, gamma_d_rate),
+        disturbance_observer_rate(gains.k51, S5, s.x3, f_q + g_q * acting_elevator, q_d_rate),
         linear_auxiliary_rate(s.xi1, 0.5 * gains.k12, g_v, thrust, thrust_wanted),
         linear_auxiliary_rate(s.xi2, gains.k52, g_q, elevator, elevator_wanted),
-        S1,
-        S2,
-        f_v + g_v * acting_thrust + d1_hat,
     )
 
 
 @compiled
 def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d, begun):  # type: ignore[no-untyped-def]
+    observers, auxiliary = (0.0, 0.0, 0.0), (0.0, 0.0)
+    reference = (V, z, V, V_rate, z, z_rate)
+    acceleration = (0.0, own.V, 0.0)
     return State(
-        x1=0.0,
-        x2=0.0,
-        x3=0.0,
-        gamma_d=gamma_d,
-        theta_d=theta_d,
-        q_d=0.0,
-        xi1=0.0,
-        xi2=0.0,
-        V_mean=V,
-        z_mean=z,
-        V_r=V,
-        V_r_rate=V_rate,
-        z_r=z,
-        z_r_rate=z_rate,
-        thrust=own.thrust,
-        elevator=own.elevator,
-        V_rate_f=0.0,
-        V_before=own.V,
-        V_rate_before=0.0,
-        begun=begun,
+        *observers, gamma_d, theta_d, 0.0, *auxiliary, *reference, own.thrust, own.elevator, *acceleration, begun
     )
 
 
@@ -278,15 +277,16 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
     V, z = gains.V_start, gains.z_start
     if gains.in_flight > 0.0:
         V, z = own.V, own.z
-    return _initial(own, V, 0.0, z, 0.0, 0.0, 0.0, 0.0)
+    state: State = _initial(own, V, 0.0, z, 0.0, 0.0, 0.0, 0.0)
+    return state
 
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
     """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output.
 
-    The law begins at the first tick, and anew at the first one with a neighbour: the reference filter at the neighbours'
-    mean, the commands' filters at what they filter.
+    At the first tick the filters are set: that of the reference at the neighbours' mean (before the first record, at
+    what the mission tells of it), those of the commands at what they filter.
     """
     s = state
     # Nearest-neighbour reference (4.10), (4.11).
@@ -294,7 +294,8 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     z_id, z_id_rate, _ = weighted_average(heard, 2, gains.oldest)
     if weights == 0.0:
         V_id, z_id = s.V_mean, s.z_mean
-        z_id_rate = gains.z_rate_start if s.begun < 2.0 else 0.0
+        if s.begun < 2.0 and gains.in_flight == 0.0:
+            z_id_rate = gains.z_rate_start
     begun = 2.0 if weights > 0.0 or s.begun == 2.0 else 1.0
     beginning = s.begun == 0.0
     V_d, V_d_rate, z_d, z_d_rate = V_id, V_id_rate, z_id, z_id_rate
@@ -307,31 +308,12 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     for _ in range(3 if beginning else 1):
         if beginning:
             s = _initial(own, V_id, V_id_rate, z_id, z_id_rate, gamma_d, theta_d, begun)
-        law = _evaluate(s, own, V_d, V_d_rate, z_d, z_d_rate, model, gains)
+        law = _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt)
         gamma_d, theta_d = law.gamma_bar, law.theta_bar
 
-    # The command that moves the lagging actuators, from where they will be when it comes into force.
-    thrust, elevator = law.thrust, law.elevator
-    thrust_position, elevator_position = s.thrust, s.elevator
-    if gains.lead > 0.0 and model.lag > 0.0:
-        thrust_position = modelled_position(s.thrust, own.thrust, model.lag, dt)
-        elevator_position = modelled_position(s.elevator, own.elevator, model.lag, dt)
-        thrust = leading_command(thrust_position, law.thrust, model.lag, gains.lead)
-        elevator = leading_command(elevator_position, law.elevator, model.lag, gains.lead)
-        thrust = clip(thrust, model.thrust_min, model.thrust_max)
-        elevator = clip(elevator, model.elevator_min, model.elevator_max)
-
-    # The acceleration that the neighbours are told.
-    V_rate = law.V_rate
     V_rate_f = s.V_rate_f
-    if gains.accelerometer > 0.0:
-        known = law.V_rate - law.d1_hat
-        measured = (own.V - s.V_before) / dt
-        V_rate = known + (measured - s.V_rate_before)
-        V_rate_f = known
     if gains.rate_filter > 0.0:
-        V_rate_f = s.V_rate_f + dt * first_order_rate(s.V_rate_f, law.V_rate, gains.rate_filter)
-        V_rate = s.V_rate_f
+        V_rate_f += dt * first_order_rate(s.V_rate_f, law.known_V_rate + law.d1_hat, gains.rate_filter)
     z_mean = z_id
     if weights == 0.0:
         z_mean += dt * z_id_rate
@@ -350,27 +332,14 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         V_r_rate=V_d_rate,
         z_r=z_d,
         z_r_rate=z_d_rate,
-        thrust=thrust_position,
-        elevator=elevator_position,
+        thrust=law.thrust_position,
+        elevator=law.elevator_position,
         V_rate_f=V_rate_f,
         V_before=own.V,
-        V_rate_before=law.V_rate - law.d1_hat,
+        known_before=law.known_V_rate,
         begun=begun,
     )
-    return after, Output(
-        thrust,
-        elevator,
-        V_rate,
-        V_id,
-        z_id,
-        law.S1,
-        law.S2,
-        law.d1_hat,
-        law.d2_hat,
-        law.lumped_hat,
-        law.thrust_wanted,
-        law.elevator_wanted,
-    )
+    return after, law
 
 
 @compiled
@@ -382,42 +351,23 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
     """`SIGNALS` for the instant of ``state``."""
-    return (
-        output.V_id,
-        output.z_id,
-        own.V - output.S1,
-        own.z - output.S2,
-        output.S1,
-        output.S2,
-        state.gamma_d,
-        state.theta_d,
-        state.q_d,
-        output.d1_hat,
-        output.d2_hat,
-        output.lumped_hat,
-        state.xi1,
-        state.xi2,
-        output.thrust_wanted,
-        output.elevator_wanted,
-    )
+    reference_tracked = (own.V - output.S1, own.z - output.S2)
+    estimates = (output.d1_hat, output.d2_hat, output.lumped_hat)
+    errors, wanted = (output.S1, output.S2), (output.thrust_wanted, output.elevator_wanted)
+    return (output.V_id, output.z_id, *reference_tracked, *errors, *state[3:8], *estimates, *wanted)
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    positive = "k11 k12 k21 k31 k32 k42 k51 k52 tau1 tau2 tau3 oldest filter_damping".split()
-    problems = [
-        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
-        for name in positive
-        if getattr(gains, name) <= 0.0
-    ]
+    problems = positive(gains, "k11 k12 k21 k31 k32 k42 k51 k52 tau1 tau2 tau3 oldest filter_damping")
     if problems:
         return problems
     if gains.k32 < 5.9:
         problems.append(
             Problem(
                 False,
-                f"gain k32 = {gains.k32:g} 1/s: condition (4.63) asks for more than g_gamma + 1, about 5.9 at 30 m/s; the "
-                "published value does not meet it either and flies",
+                f"gain k32 = {gains.k32:g} 1/s: condition (4.63) asks for more than g_gamma + 1, about 5.9 at 30 m/s; "
+                "the published value does not meet it either and flies",
             )
         )
     h = flight.period
@@ -429,26 +379,26 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
         "tau2": 1.0 / gains.tau2,
         "tau3": 1.0 / gains.tau3,
     }
-    for name, rate in rates.items():
-        if rate * h >= 2.0:
-            problems.append(
-                Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {h * 1e3:g} ms")
-            )
+    problems += stable_in_steps(rates, h)
     if h > 0.01:
         problems.append(
-            Problem(False, f"control rate {1.0 / h:.0f} Hz: the pitch-rate loop needs 100 Hz, and 200 Hz for its claims")
+            Problem(False, f"control rate {1.0 / h:.0f} Hz: the pitch-rate loop needs 100 Hz, its claims 200 Hz")
         )
     if gains.filter_frequency == 0.0 and flight.exchange_period > 0.01:
         problems.append(
             Problem(
                 False,
-                "without the filter of the averages (gain filter_frequency) the ring is unstable for neighbours at less "
-                f"than 100 Hz; they are heard at {1.0 / flight.exchange_period:.0f} Hz",
+                "without the filter of the averages (gain filter_frequency) the ring is unstable for neighbours at "
+                f"less than 100 Hz; they are heard at {1.0 / flight.exchange_period:.0f} Hz",
             )
         )
-    if flight.exchange_period + flight.latency >= gains.oldest:
+    oldest = flight.exchange_period + flight.latency
+    if oldest >= gains.oldest:
         problems.append(
-            Problem(True, f"gain oldest = {gains.oldest:g} s: every record would be too old, it must exceed the exchange "
-                    f"period plus the latency, {flight.exchange_period + flight.latency:g} s")
+            Problem(
+                True,
+                f"gain oldest = {gains.oldest:g} s: must exceed the exchange period plus the latency, {oldest:g} s, or "
+                "records are too old when the next ones come",
+            )
         )
     return problems

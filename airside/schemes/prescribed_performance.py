@@ -35,7 +35,7 @@ from ftcc.airside.elements.performance import performance_transform, performance
 from ftcc.airside.elements.saturation import auxiliary_step
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, clip
-from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -108,7 +108,7 @@ class State(NamedTuple):
     gamma_d: Annotated[float, Q("gamma_d", "rad", "filtered flight-path command")]
     theta_d: Annotated[float, Q("theta_d", "rad", "filtered pitch command")]
     q_d: Annotated[float, Q("q_d", "rad/s", "filtered pitch-rate command")]
-    F_gamma: Annotated[float, Q("F_g", "-", "adapted parameter of the flight path")]
+    F_gamma: Annotated[float, Q("F_gamma", "-", "adapted parameter of the flight path")]
     F_q: Annotated[float, Q("F_q", "-", "adapted parameter of the pitch rate")]
     zeta: Annotated[float, Q("zeta", "rad", "auxiliary system")]
     integral: Annotated[float, Q("I", "m", "integral of the speed error")]
@@ -157,19 +157,15 @@ SHARED = {
     "follower": (Q("z_d", "m", "estimated altitude of the leader"), Q("v", "m/s", "rate of the reference")),
     "leader": (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate")),
 }
+_S = quantities(State)
 SIGNALS = (
-    Q("z_d", "m", "estimated altitude of the leader"),
+    _S["z_d"],
     Q("z_r", "m", "altitude reference that the law tracks"),
     Q("z_h", "m", "altitude as the law sees it"),
     Q("e2", "m", "altitude error that the tube bounds", bound="epsilon"),
     Q("epsilon", "m", "half-width of the tube"),
     Q("E2", "-", "transformed altitude error"),
-    Q("gamma_d", "rad", "commanded flight-path angle"),
-    Q("theta_d", "rad", "commanded pitch"),
-    Q("q_d", "rad/s", "commanded pitch rate"),
-    Q("F_gamma", "-", "adapted parameter of the flight path"),
-    Q("F_q", "-", "adapted parameter of the pitch rate"),
-    Q("zeta", "rad", "auxiliary system"),
+    *(_S[name] for name in ("gamma_d", "theta_d", "q_d", "F_gamma", "F_q", "zeta")),
     Q("unexplained", "rad/s^2", "pitch acceleration that the control does not explain"),
     Q("elevator_wanted", "rad", "elevator command before saturation"),
 )
@@ -313,29 +309,10 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[n
 
 @compiled
 def _initial(own, z_d, gamma_d, theta_d, q_d, u_l):  # type: ignore[no-untyped-def]
-    return State(
-        z_d=z_d,
-        gamma_d=gamma_d,
-        theta_d=theta_d,
-        q_d=q_d,
-        F_gamma=0.0,
-        F_q=0.0,
-        zeta=0.0,
-        integral=0.0,
-        theta_f=own.theta,
-        theta_f_rate=0.0,
-        u_f=0.0,
-        u_f_rate=0.0,
-        z_h=own.z,
-        v_f=0.0,
-        z_r=z_d,
-        v_r=0.0,
-        q_h=own.q,
-        u_s=-own.elevator,
-        u_l=u_l,
-        V_before=own.V,
-        t_start=own.t,
-    )
+    adapted, integral = (0.0, 0.0, 0.0), 0.0
+    filters = (own.theta, 0.0, 0.0, 0.0, own.z, 0.0, z_d, 0.0)
+    estimator = (own.q, -own.elevator)
+    return State(z_d, gamma_d, theta_d, q_d, *adapted, integral, *filters, *estimator, u_l, own.V, own.t)
 
 
 @compiled
@@ -348,7 +325,8 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
         law = _evaluate(_initial(own, z_d, gamma_d, theta_d, q_d, u_l), own, 0.0, 0.0, reference, model, gains)
         gamma_d, theta_d, q_d = law.gamma_bar, law.theta_bar, law.q_bar
         u_l = clip(law.u_before_lead, -model.elevator_max, -model.elevator_min)
-    return _initial(own, z_d, gamma_d, theta_d, q_d, u_l)
+    state: State = _initial(own, z_d, gamma_d, theta_d, q_d, u_l)
+    return state
 
 
 @compiled
@@ -388,7 +366,8 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         q_d=s.q_d + dt * first_order_rate(s.q_d, law.q_bar, gains.tau3),
         F_gamma=_capped(s.F_gamma + dt * F_gamma_rate, gains.cap),
         F_q=_capped(s.F_q + dt * F_q_rate, gains.cap),
-        zeta=gains.auxiliary * auxiliary_step(s.zeta, gains.k52, law.E5, law.elevator_wanted - law.elevator, gains.mu, dt),
+        zeta=gains.auxiliary
+        * auxiliary_step(s.zeta, gains.k52, law.E5, law.elevator_wanted - law.elevator, gains.mu, dt),
         integral=s.integral + dt * integral_rate,
         theta_f=s.theta_f + dt * theta_f_rate,
         theta_f_rate=s.theta_f_rate + dt * theta_f_acceleration,
@@ -416,31 +395,18 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
     """`SIGNALS` for the instant of ``state``."""
-    return (
-        state.z_d,
-        state.z_r if gains.smoother > 0.0 else state.z_d,
-        state.z_h if gains.altitude_filter > 0.0 else own.z,
-        output.error,
-        output.width,
-        output.transformed,
-        state.gamma_d,
-        state.theta_d,
-        state.q_d,
-        state.F_gamma,
-        state.F_q,
-        state.zeta,
-        output.unexplained,
-        output.elevator_wanted,
-    )
+    z_r = state.z_r if gains.smoother > 0.0 else state.z_d
+    z_h = state.z_h if gains.altitude_filter > 0.0 else own.z
+    tube = (output.error, output.width, output.transformed)
+    return (state.z_d, z_r, z_h, *tube, *state[1:7], output.unexplained, output.elevator_wanted)
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(
         gains,
-        ["k11", "k12", "beta1", "phi", "tube_first", "tube_last", "tube_decay", "kl", "ku", "k21", "k31", "k41", "k51"]
-        + ["k52", "tau1", "tau2", "tau3", "w21", "w22", "w23", "w24", "g11", "w41", "w42", "w43", "w44", "g21", "mu"]
-        + ["network_filter", "inner", "servo"],
+        "k11 k12 beta1 phi tube_first tube_last tube_decay kl ku k21 k31 k41 k51 k52 tau1 tau2 tau3 w21 w22 w23 w24 "
+        "g11 w41 w42 w43 w44 g21 mu network_filter inner servo",
     )
     if problems:
         return problems
@@ -452,15 +418,15 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     if flight.leader_speed_varies:
         problems.append(Problem(True, "the leader's speed must be constant: followers know it as a mission constant"))
     if gains.in_flight == 0.0:
+        low, high = -gains.kl * gains.tube_first, gains.ku * gains.tube_first
         for uav, initial in flight.initial.items():
             error = initial.z - gains.z_start
-            if not -gains.kl * gains.tube_first < error < gains.ku * gains.tube_first:
+            if not low < error < high:
                 problems.append(
                     Problem(
                         True,
                         f"UAV {uav} starts at z = {initial.z:g} m, {error:+g} m from the estimate's start: outside "
-                        f"of the performance tube -{gains.kl * gains.tube_first:g} .. {gains.ku * gains.tube_first:g} m, "
-                        "eq. (3.24)",
+                        f"of the performance tube {low:g} .. {high:g} m, eq. (3.24)",
                     )
                 )
     for name in ("w24", "w44"):

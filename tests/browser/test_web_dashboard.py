@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the system package chromium"),
     pytest.mark.skipif(shutil.which("chromedriver") is None, reason="needs the system package chromium-driver"),
-    pytest.mark.timeout(180),
+    pytest.mark.timeout(300),
 ]
 
 SIZE = (1600, 1000)
@@ -116,7 +116,7 @@ def open_page(browser, address: str, theme: str) -> None:  # type: ignore[no-unt
         "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
     )
     browser.get(f"{address}&renderer=webgl")
-    deadline = time.monotonic() + 90.0
+    deadline = time.monotonic() + 120.0
     while time.monotonic() < deadline and colored(picture(browser)[SCENE]) < 0.002:
         time.sleep(1.0)
 

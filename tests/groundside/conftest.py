@@ -43,7 +43,7 @@ def demo_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return simulate(resolve(load("demo")), tmp_path_factory.mktemp("runs") / "demo")
 
 
-@pytest.fixture()
+@pytest.fixture
 def edited(tmp_path: Path) -> Iterator[Callable[..., Path]]:
     """Write a changed demo scenario: the function that is given changes the document in place."""
 

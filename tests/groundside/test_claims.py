@@ -39,7 +39,7 @@ class Known:
         return self.data[(name, uav)]
 
 
-@pytest.fixture()
+@pytest.fixture
 def known() -> Known:
     return Known(
         {
@@ -173,7 +173,19 @@ def test_no_tolerance(text: str) -> None:
 
 @pytest.mark.parametrize(
     "expression",
-    ["z.__class__", "z[0]", "(lambda: 1)()", "z if z else x", "'a'", "open('x')", "z == x", "z +", "f(x)", "True", "z;x"],
+    [
+        "z.__class__",
+        "z[0]",
+        "(lambda: 1)()",
+        "z if z else x",
+        "'a'",
+        "open('x')",
+        "z == x",
+        "z +",
+        "f(x)",
+        "True",
+        "z;x",
+    ],
 )
 def test_expressions_are_arithmetic_and_nothing_else(expression: str) -> None:
     with pytest.raises(ValueError, match=r"arithmetic|functions|operators|number|no expression"):

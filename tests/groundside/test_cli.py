@@ -16,7 +16,7 @@ from ftcc.groundside.cli import main
 Outcome = tuple[int, str, str]
 
 
-@pytest.fixture()
+@pytest.fixture
 def ftcc(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., Outcome]:
     """Run a command in an empty folder: exit code, standard output, standard error."""
 
@@ -61,7 +61,7 @@ def test_simulate_records_where_it_says(ftcc: Callable[..., Outcome], tmp_path: 
 
 
 def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
-    settings = ("--set", "faults.0.at=20", "--set", "faults.0.without_trim=true")
+    settings = ("--set", "faults.0.at=20", "--set", "faults.0.bias=0.6", "--set", "faults.0.without_trim=true")
     code, _, err = ftcc("simulate", "containment", "--duration", 40, "--out", tmp_path / "run", *settings)
     assert code == 1
     assert "no level trim" in err

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import struct
 import sys
 import time
+import traceback
 from typing import Any
 
 import psutil
@@ -25,33 +25,45 @@ class Peer:
     def wait_until_ready(self, seconds: float) -> bool:
         until = time.monotonic() + seconds
         while not self.mesh.ready and time.monotonic() < until:
-            select.select([self.mesh], [], [], 0.05)
-            self.mesh.receive()
+            time.sleep(0.01)
         return self.mesh.ready
 
     def awaited(self) -> list[str]:
         return self.mesh.awaited
 
     def publish(self, uav: int, first: int, last: int) -> None:
-        """At most 8 at a time, so that nobody is overrun."""
         for n in range(first, last):
             self.mesh.publish(uav, struct.pack("<ii", uav, n))
-            if n % 8 == 7:
-                time.sleep(0.0005)
+
+    def exchange(self, uav: int, count: int, ahead: int, seconds: float) -> list[list[int]]:
+        """Publish ``count`` records, never more than ``ahead`` beyond those received; what was received."""
+        arrived: list[list[int]] = []
+        sent = 0
+        until = time.monotonic() + seconds
+        while (sent < count or len(arrived) < count) and time.monotonic() < until:
+            arrived += self._unpacked()
+            while sent < min(count, len(arrived) + ahead):
+                self.publish(uav, sent, sent + 1)
+                sent += 1
+            time.sleep(0.0002)
+        return arrived
+
+    def _unpacked(self) -> list[list[int]]:
+        return [list(struct.unpack("<ii", payload)) for payload in self.mesh.receive()]
 
     def receive(self, count: int, seconds: float) -> list[list[int]]:
-        """All that comes until ``count`` records are there, woken by the mesh alone."""
+        """All that comes until ``count`` records are there."""
         arrived: list[list[int]] = []
         until = time.monotonic() + seconds
         while len(arrived) < count and time.monotonic() < until:
-            select.select([self.mesh], [], [], 0.5)
-            arrived += [list(struct.unpack("<ii", payload)) for payload in self.mesh.receive()]
+            arrived += self._unpacked()
+            time.sleep(0.001)
         return arrived
 
     def poll(self, seconds: float) -> list[list[int]]:
         """What one reading gives after a pause: real time."""
         time.sleep(seconds)
-        return [list(struct.unpack("<ii", payload)) for payload in self.mesh.receive()]
+        return self._unpacked()
 
     def sockets(self) -> list[list[str]]:
         """Kind and local address of every internet socket of this process."""
@@ -68,7 +80,11 @@ class Peer:
 
 if __name__ == "__main__":
     peer = Peer()
-    for line in sys.stdin:
-        name, arguments = json.loads(line)
-        print(json.dumps(getattr(peer, name)(**arguments)), flush=True)
-    os._exit(0)
+    try:
+        for line in sys.stdin:
+            name, arguments = json.loads(line)
+            print(json.dumps(getattr(peer, name)(**arguments)), flush=True)
+    except Exception:
+        traceback.print_exc()
+    # Threads of Zenoh would keep a process alive that ends in any other way.
+    os._exit(1)

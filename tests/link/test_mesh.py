@@ -33,7 +33,9 @@ class Process:
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps([name, arguments]) + "\n")
         self._process.stdin.flush()
-        return json.loads(self._process.stdout.readline())
+        answer = self._process.stdout.readline()
+        assert answer, f"the peer died of {name}; its last words are in the captured output"
+        return json.loads(answer)
 
     def kill(self) -> None:
         self._process.kill()
@@ -101,20 +103,26 @@ def test_peers_may_start_in_any_order(start, ports):
 
 
 def test_in_lockstep_every_record_arrives_and_in_order(start, ports):
-    """Two thousand records each way between two peers at once."""
+    """Two thousand records each way at once, neither peer more than four ahead of what it has heard."""
     one, two = start(), start()
     open_peer(one, ports, 1, hears=[2], heard_by=[(1, 2)])
     open_peer(two, ports, 2, hears=[1], heard_by=[(2, 1)])
     assert one("wait_until_ready", seconds=10.0)
     assert two("wait_until_ready", seconds=10.0)
     with ThreadPoolExecutor(2) as both:
-        for sending in [
-            both.submit(peer, "publish", uav=uav, first=0, last=2000) for uav, peer in ((1, one), (2, two))
-        ]:
-            sending.result()
-        read = [both.submit(peer, "receive", count=2000, seconds=20.0) for peer in (one, two)]
-        assert read[0].result() == [[2, n] for n in range(2000)]
-        assert read[1].result() == [[1, n] for n in range(2000)]
+        first = both.submit(one, "exchange", uav=1, count=2000, ahead=4, seconds=60.0)
+        second = both.submit(two, "exchange", uav=2, count=2000, ahead=4, seconds=60.0)
+        assert first.result() == [[2, n] for n in range(2000)]
+        assert second.result() == [[1, n] for n in range(2000)]
+
+
+def test_in_lockstep_records_wait_for_a_reader_that_is_late(start, ports):
+    one, two = start(), start()
+    open_peer(one, ports, 1, heard_by=[(1, 2)])
+    open_peer(two, ports, 2)
+    assert one("wait_until_ready", seconds=10.0)
+    one("publish", uav=1, first=0, last=1000)
+    assert two("receive", count=1000, seconds=20.0) == [[1, n] for n in range(1000)]
 
 
 def test_in_real_time_the_newest_records_are_kept(start, ports):

@@ -39,7 +39,9 @@ def test_trim_table_of_the_reference_airframe(
 
 
 def test_trim_with_all_aerodynamic_coefficients_but_the_elevator_lift_twenty_percent_higher(airframe: Airframe) -> None:
-    higher = {name: 1.2 * getattr(airframe, name) for name in Airframe._fields if name.startswith("C") and name != "CLde"}
+    higher = {
+        name: 1.2 * getattr(airframe, name) for name in Airframe._fields if name.startswith("C") and name != "CLde"
+    }
     level = trim(airframe._replace(**higher), 30.0)
     assert level.alpha == pytest.approx(0.016766, abs=1e-5)
     assert level.elevator == pytest.approx(-0.150914, abs=1e-5)

@@ -11,7 +11,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import psutil
+import pyarrow.parquet as pq
 import pytest
 
 FTCC = [sys.executable, "-m", "ftcc.groundside.cli"]
@@ -122,3 +124,11 @@ def ftcc(environment: dict[str, str]) -> Callable[..., subprocess.CompletedProce
 def events(folder: Path) -> list[dict[str, object]]:
     """The events of a run."""
     return [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+
+
+def same_flight(one: Path, other: Path) -> bool:
+    """Whether two runs recorded the same, bit for bit (nan equals nan)."""
+    a, b = (pq.read_table(folder / "signals.parquet") for folder in (one, other))
+    return a.schema.equals(b.schema, check_metadata=True) and all(
+        np.array_equal(a[name].to_numpy(), b[name].to_numpy(), equal_nan=True) for name in a.column_names
+    )

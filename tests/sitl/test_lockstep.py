@@ -6,16 +6,11 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import pyarrow.parquet as pq
 import pytest
 
-from tests.sitl.conftest import Flight
+from tests.sitl.conftest import Flight, same_flight
 
 DURATION = "30"
-
-
-def signals(folder: Path):  # type: ignore[no-untyped-def]
-    return pq.read_table(folder / "signals.parquet")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +49,7 @@ def busy_machine() -> Iterator[None]:
 def test_sixteen_processes_equal_the_simulation(fly: Callable[..., Flight], simulated: Callable[..., Path]) -> None:
     flight = fly("containment", "--speed", "max", "--duration", DURATION, "--seed", "1")
     assert flight.wait() == 0, flight.output
-    assert signals(flight.folder).equals(signals(simulated()))
+    assert same_flight(flight.folder, simulated())
 
 
 def test_with_loss_on_a_loaded_machine_too(
@@ -62,7 +57,7 @@ def test_with_loss_on_a_loaded_machine_too(
 ) -> None:
     flight = fly("containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1")
     assert flight.wait(240) == 0, flight.output
-    assert signals(flight.folder).equals(signals(simulated(("loss30",))))
+    assert same_flight(flight.folder, simulated(("loss30",)))
 
 
 @pytest.mark.parametrize("pack", ["3", "auto"])
@@ -73,11 +68,9 @@ def test_packed_vehicles_equal_the_simulation(
         "containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1", "--pack", pack
     )
     assert flight.wait() == 0, flight.output
-    assert signals(flight.folder).equals(signals(simulated(("loss30",))))
+    assert same_flight(flight.folder, simulated(("loss30",)))
 
 
 def test_another_seed_is_another_flight_only_where_chance_plays(simulated: Callable[..., Path]) -> None:
-    lossless = signals(simulated((), 1)), signals(simulated((), 2))
-    lossy = signals(simulated(("loss30",), 1)), signals(simulated(("loss30",), 2))
-    assert lossless[0].equals(lossless[1])
-    assert not lossy[0].equals(lossy[1])
+    assert same_flight(simulated((), 1), simulated((), 2))
+    assert not same_flight(simulated(("loss30",), 1), simulated(("loss30",), 2))

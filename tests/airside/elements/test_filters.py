@@ -1,0 +1,133 @@
+"""Filters and shapers against transfer functions and closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from ftcc.airside.elements.filters import (
+    butterworth,
+    complementary_rate,
+    first_order_rate,
+    high_gain_observer,
+    limited_tracker,
+    reference_shaper,
+    second_order_reference_step,
+    sliding_mode_differentiator,
+)
+from tests.airside.elements.motion import integrated
+
+T = np.linspace(0.0, 2.0, 41)
+
+
+def response(numerator: list[float], denominator: list[float], u: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Output of a transfer function, from rest."""
+    return np.asarray(signal.lsim((numerator, denominator), u, t)[1])
+
+
+def test_first_order_filter_takes_its_time_constant():
+    (value,) = integrated(lambda t, y: [first_order_rate(y[0], 3.0, 0.25)], [1.0], T)
+    assert value == pytest.approx(3.0 - 2.0 * np.exp(-T / 0.25), abs=1e-8)
+
+
+@pytest.mark.parametrize("w", [1.0, 20.0])
+def test_low_pass_is_the_second_order_butterworth(w):
+    value, _ = integrated(lambda t, y: butterworth(y[0], y[1], 2.0, w), [0.0, 0.0], T)
+    b, a = signal.butter(2, w, analog=True)
+    assert value == pytest.approx(response(b, a, np.full(len(T), 2.0), T), abs=1e-7)
+
+
+def test_high_gain_observer_is_its_transfer_function_and_gives_the_rate():
+    """(5.22)-(5.24): 1/(eps^2 s^2 + l eps s + 1); after the transient rate/eps follows the derivative to O(eps)."""
+    eps, damping = 0.03, 2.0
+    fine = np.linspace(0.0, 2.0, 20001)
+    value, rate = integrated(lambda t, y: high_gain_observer(y[0], y[1], math.sin(t), eps, damping), [0.0, 0.0], T)
+    expected = response([1.0], [eps * eps, damping * eps, 1.0], np.sin(fine), fine)
+    assert value == pytest.approx(np.interp(T, fine, expected), abs=1e-6)
+    assert rate[T > 0.5] / eps == pytest.approx(np.cos(T[T > 0.5]), abs=2.5 * eps)
+
+
+def test_differentiator_follows_a_sine_exactly_after_a_finite_time():
+    """abs(x'') = 4 < mu2 = 10; in steps of h the error is of the order of h."""
+    p, e, h = 0.5, 0.0, 1e-4
+    worst = 0.0
+    for k in range(30000):
+        t = k * h
+        if t > 2.0:
+            worst = max(worst, abs(e - 4.0 * math.cos(2.0 * t) / 2.0))
+        p_rate, e_rate = sliding_mode_differentiator(p, e, math.sin(2.0 * t), 6.0, 10.0)
+        p, e = p + h * p_rate, e + h * e_rate
+    assert worst < 20.0 * h
+
+
+def test_differentiator_stands_still_on_a_constant():
+    assert sliding_mode_differentiator(1.5, 0.0, 1.5, 6.0, 10.0) == (0.0, 0.0)
+
+
+def test_complementary_filter_follows_a_climb_at_once_and_forgets_an_offset():
+    (z,) = integrated(lambda t, y: [complementary_rate(y[0], 1.5, 10.0 + 1.5 * t, 2.0)], [13.0], T)
+    assert z - (10.0 + 1.5 * T) == pytest.approx(3.0 * np.exp(-2.0 * T), abs=1e-8)
+
+
+def test_complementary_filter_shows_a_rate_error_divided_by_its_gain():
+    t = np.linspace(0.0, 12.0, 13)
+    (z,) = integrated(lambda t, y: [complementary_rate(y[0], 0.3, 0.0, 2.0)], [0.0], t)
+    assert z[-1] == pytest.approx(0.15, abs=1e-8)
+
+
+def test_tracker_has_a_double_pole_while_its_acceleration_is_free():
+    z, _ = integrated(lambda t, y: limited_tracker(y[0], y[1], 0.1, 0.0, 2.0, 1.5), [0.0, 0.0], T)
+    assert z == pytest.approx(0.1 * (1.0 - np.exp(-2.0 * T) * (1.0 + 2.0 * T)), abs=1e-8)
+
+
+def test_tracker_limits_its_acceleration_and_has_no_lag_on_a_ramp():
+    assert limited_tracker(0.0, 0.0, 100.0, 0.0, 2.0, 1.5) == (0.0, 1.5)
+    assert limited_tracker(0.0, 3.0, -100.0, 0.0, 2.0, 1.5) == (3.0, -1.5)
+    assert limited_tracker(7.0, 2.0, 7.0, 2.0, 2.0, 1.5) == (2.0, 0.0)
+
+
+def test_reference_filter_converges_to_its_differential_equation():
+    w, damping = 2.0, 1.5
+    t = np.linspace(0.0, 4.0, 5)
+    exact, _ = integrated(
+        lambda t, y: [y[1], w * w * (math.sin(t) - y[0]) + 2.0 * damping * w * (math.cos(t) - y[1])], [1.0, 0.0], t
+    )
+    errors = []
+    for h in (0.01, 0.005):
+        value, rate = 1.0, 0.0
+        for k in range(round(4.0 / h)):
+            now = (k + 1) * h
+            value, rate = second_order_reference_step(value, rate, math.sin(now), math.cos(now), w, damping, h)
+        errors.append(abs(value - exact[-1]))
+    assert errors[0] < 0.02
+    assert errors[1] == pytest.approx(0.5 * errors[0], rel=0.1)
+
+
+def test_reference_filter_has_no_lag_on_a_ramp_and_is_stable_in_any_step():
+    value, rate = 0.0, 1.5
+    for k in range(50):
+        value, rate = second_order_reference_step(value, rate, 1.5 * k * 0.005, 1.5, 2.0, 1.5, 0.005)
+    assert (value, rate) == pytest.approx((1.5 * 50 * 0.005, 1.5))
+    value, rate = 5.0, 0.0
+    for _ in range(400):
+        value, rate = second_order_reference_step(value, rate, 0.0, 0.0, 2.0, 1.5, 10.0)
+    assert abs(value) < 1e-3
+
+
+def test_shaper_has_a_triple_pole_while_its_limits_are_free():
+    w = 2.0
+    z, v, a = integrated(lambda t, y: reference_shaper(y[0], y[1], y[2], 0.3, 0.0, w, 2.5, 1.0), [0.0] * 3, T)
+    s = w * T
+    assert z == pytest.approx(0.3 * (1.0 - np.exp(-s) * (1.0 + s + 0.5 * s * s)), abs=1e-8)
+    assert a == pytest.approx(0.3 * w * w * s * np.exp(-s) * (1.0 - 0.5 * s), abs=1e-7)
+
+
+def test_shaper_keeps_its_limits_and_arrives_from_afar():
+    t = np.linspace(0.0, 60.0, 601)
+    z, v, a = integrated(lambda t, y: reference_shaper(y[0], y[1], y[2], 100.0, 0.0, 2.0, 2.5, 1.0), [0.0] * 3, t)
+    assert np.abs(v).max() <= 2.5 + 1e-3
+    assert np.abs(a).max() <= 1.0 + 1e-9
+    assert z[-1] == pytest.approx(100.0, abs=1e-3)
