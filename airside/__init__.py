@@ -1,0 +1,1 @@
+"""What would be on board: flight-path variables, elements, schemes, the autopilot process. Imports only `link`."""

@@ -132,7 +132,7 @@ def fly(
     wall = time.monotonic() - begun
     show_claims(folder)
     share = 100.0 * outcome.late / max(outcome.ticks, 1)
-    flown = outcome.ticks * mission.timing.period / len(mission.vehicles)
+    flown = outcome.flown * mission.timing.period
     console.print(
         f"flew {flown:.1f} s in {wall:.1f} s ({flown / max(wall, 1e-9):.1f} times real time), "
         f"{outcome.late} of {outcome.ticks} ticks late ({share:.2f} %)"

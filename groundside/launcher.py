@@ -77,6 +77,8 @@ class Outcome:
     late: int = 0
     ticks: int = 0
     """Ticks flown by all vehicles together."""
+    flown: int = 0
+    """The last tick of the one that flew longest."""
     stopped: bool = False
     """Ended before its time, on request."""
 
@@ -230,8 +232,9 @@ class Swarm:
         match message:
             case Ready():
                 child.ready = True
-            case Ended(_, late, ticks):
+            case Ended(tick, late, ticks):
                 child.ended = message
+                self.outcome.flown = max(self.outcome.flown, min(tick, self.mission.timing.ticks))
                 if child.kind == "vehicle":
                     self.outcome.late += late
                     self.outcome.ticks += ticks

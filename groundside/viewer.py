@@ -37,6 +37,8 @@ _START = 20.0
 _WAITING = 64
 """Frames that wait for the viewer; at 10 Hz the six seconds that a slow start takes."""
 
+_BETWEEN_FLUSHES = 0.15
+"""Shortest time between two deliveries, s: a page that joins late reads them one by one."""
 _UNREAD = 50
 """Frames sent before the viewer must have read them."""
 _BEHIND = "the viewer does not keep up: not everything is shown"
@@ -216,11 +218,13 @@ class Viewer:
             webbrowser.open(self.address)
         stream = self._connect(self._url)
         sent = 0
+        flushed = 0.0
         while (entries := self._frames.get()) is not None:
             write(stream, entries)
-            if self._frames.empty():
+            if self._frames.empty() and time.monotonic() - flushed >= _BETWEEN_FLUSHES:
                 # Whole frames: cut in the middle, some aircraft would be drawn a moment behind the others.
                 stream.flush(timeout_sec=0.0)
+                flushed = time.monotonic()
             sent += 1
             if sent % _UNREAD == 0:
                 self._wait_for_reader(stream)

@@ -42,6 +42,8 @@ LOOPBACK = "127.0.0.1"
 
 _DATAGRAMS_PER_READ = 64
 _LARGEST_DATAGRAM = 4096
+_LARGEST = 3.4e38
+"""What float32 can hold."""
 _UNUSED_CONTROLS = (0.0,) * 12
 _POSITION_AND_VELOCITY = (
     dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
@@ -101,13 +103,16 @@ class Endpoint:
         Raises
         ------
         ValueError
-            If a float in one of them is nan or inf: such a value would be believed on the other side.
+            If a float in one of them is nan, inf or beyond float32: such a value would be believed on the other side.
         """
         datagram = bytearray()
         for message in messages:
             if not _finite(message):
                 raise ValueError(f"{message.get_type()} holds a value that is not finite: {message}")
-            datagram += message.pack(self._mav)
+            try:
+                datagram += message.pack(self._mav)
+            except OverflowError as error:
+                raise ValueError(f"{message.get_type()} holds a value that float32 cannot: {message}") from error
             self._mav.seq = (self._mav.seq + 1) % 256
         self._last = bytes(datagram)
         self._put()
@@ -208,9 +213,7 @@ def read_state(messages: Sequence[Any], state: NDArray[np.float64], controls: ND
         "HIL_ACTUATOR_CONTROLS",
     ) or not (a.time_boot_ms == p.time_boot_ms == force.time_usec // 1000):
         return -1
-    state[:] = (
-        (a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
-    )
+    state[:] = (a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
     controls[:] = force.controls[:4]
     return int(force.time_usec)
 
@@ -261,8 +264,8 @@ def read_target(message: Any, target: NDArray[np.float64]) -> int:
 
 
 def float_array(stamp_us: int, name: str, values: Sequence[float]) -> Any:
-    """Up to 58 numbers as DEBUG_FLOAT_ARRAY; nan, which no message may carry, is sent as 0."""
-    data = [value if math.isfinite(value) else 0.0 for value in values]
+    """Up to 58 numbers as DEBUG_FLOAT_ARRAY; what no message may carry (nan, beyond float32) is sent as 0."""
+    data = [value if abs(value) < _LARGEST else 0.0 for value in values]
     return dialect.MAVLink_debug_float_array_message(stamp_us, name.encode(), 0, data + [0.0] * (58 - len(data)))
 
 

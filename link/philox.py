@@ -21,6 +21,8 @@ _MASK = 0xFFFFFFFF
 @compiled
 def philox(seed: int, a: int, b: int, c: int, d: int):  # type: ignore[no-untyped-def]
     """Four 32-bit integers for the 64-bit key ``seed`` and the counter ``(a, b, c, d)`` of 32-bit integers."""
+    # Numbers from arrays would warn of the overflow that is meant here.
+    a, b, c, d = int(a), int(b), int(c), int(d)
     k0 = seed & _MASK
     k1 = (seed >> 32) & _MASK
     for _ in range(10):

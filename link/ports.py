@@ -1,15 +1,13 @@
-"""The ports of a run: one block per swarm, below the ephemeral range, held by a lock file while the swarm flies."""
+"""The ports of a run: one block per swarm, below the ephemeral range, held from before its processes start."""
 
 from __future__ import annotations
 
-import fcntl
 import os
 import socket
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
 
 from ftcc.link.mavlink import LOOPBACK
 
@@ -40,7 +38,8 @@ class PortBlock:
 
     base: int
     uavs: tuple[int, ...]
-    lock: IO[str] | None = field(default=None, repr=False)
+    guard: socket.socket | None = field(default=None, repr=False)
+    """Listens on the block's first TCP port, which nobody else needs: whoever holds it holds the block."""
 
     @property
     def station(self) -> int:
@@ -63,9 +62,9 @@ class PortBlock:
 
     def release(self) -> None:
         """Let others have the block."""
-        if self.lock is not None:
-            self.lock.close()
-            self.lock = None
+        if self.guard is not None:
+            self.guard.close()
+            self.guard = None
 
 
 def runtime_folder() -> Path:
@@ -76,9 +75,12 @@ def runtime_folder() -> Path:
     return folder
 
 
-def _in_use(ports: Sequence[int]) -> int | None:
-    for port in ports:
+def _in_use(base: int, size: int) -> int | None:
+    """A port of the block that somebody has bound, beside the guard's own."""
+    for port in range(base, base + size):
         for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
+            if (port, kind) == (base, socket.SOCK_STREAM):
+                continue
             with socket.socket(socket.AF_INET, kind) as probe:
                 if kind == socket.SOCK_STREAM:
                     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -89,14 +91,16 @@ def _in_use(ports: Sequence[int]) -> int | None:
     return None
 
 
-def _lock(base: int) -> IO[str] | None:
-    handle = (runtime_folder() / f"ports-{base}.lock").open("w")
+def _guard(base: int) -> socket.socket | None:
+    guard = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    guard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        guard.bind((LOOPBACK, base))
+        guard.listen()
     except OSError:
-        handle.close()
+        guard.close()
         return None
-    return handle
+    return guard
 
 
 def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
@@ -112,14 +116,16 @@ def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
     candidates = [base] if base is not None else range(_FIRST, _END - size, stride)
     for candidate in candidates:
         block = PortBlock(candidate, tuple(uavs))
-        taken = _in_use(range(candidate, candidate + size))
-        if taken is None:
-            block.lock = _lock(candidate)
-            if block.lock is not None:
+        taken: int | None = candidate
+        block.guard = _guard(candidate)
+        if block.guard is not None:
+            taken = _in_use(candidate, size)
+            if taken is None:
                 return block
+            block.release()
         if base is not None:
             raise PortError(
-                f"port {taken or candidate} is in use; the block {candidate}-{candidate + size - 1} must be free "
+                f"port {taken} is in use; the block {candidate}-{candidate + size - 1} must be free "
                 "(leave the option out to take the first free block)"
             )
     raise PortError(f"no {size} free ports in a row between {_FIRST} and {_END}")

@@ -1,0 +1,1 @@
+"""What flies: airframe, actuators and their faults, disturbances, sensors, the vehicle process. Imports only `link`."""

@@ -19,7 +19,7 @@ UAVS = (1, 2, 3, 4, 5, 6, 7, 8)
 
 @pytest.fixture(autouse=True)
 def runtime(tmp_path, monkeypatch):
-    """Locks of these tests alone."""
+    """A runtime folder of these tests alone."""
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path))
 
 
@@ -86,6 +86,7 @@ def test_a_given_block_with_a_port_in_use_is_refused_and_the_port_named(kind):
     block.release()
     taken = block.of(3).mesh
     with socket.socket(socket.AF_INET, kind) as stranger:
+        stranger.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(kind == socket.SOCK_STREAM))
         stranger.bind((LOOPBACK, taken))
         if kind == socket.SOCK_STREAM:
             stranger.listen()
@@ -118,5 +119,5 @@ def test_a_given_free_block_is_taken_as_it_is(blocks):
     assert held(blocks, UAVS, free.base).base == free.base
 
 
-def test_the_folder_of_the_locks_is_private_to_the_user():
+def test_the_folder_of_running_swarms_is_private_to_the_user():
     assert runtime_folder().stat().st_mode & 0o077 == 0

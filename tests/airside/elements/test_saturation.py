@@ -31,11 +31,11 @@ def stiff(start: float, gain: float, error: float, excess: float, t: float) -> f
 
 
 @pytest.mark.parametrize("step", [auxiliary_step, squared_auxiliary_step])
-@pytest.mark.parametrize(("gain", "error", "excess", "t"), [(3.0, 0.4, 0.1, 1.5), (1.1, 0.2, -0.05, 1.0)])
+@pytest.mark.parametrize(("gain", "error", "excess", "t"), [(3.0, 0.4, 0.1, 0.4), (1.1, 0.2, -0.05, 0.6)])
 def test_both_auxiliary_systems_converge_to_the_printed_equation(step, gain, error, excess, t):
     """Above the threshold; explicit in the input, implicit in the rest: first order in h."""
     expected = stiff(0.6, gain, error, excess, t)
-    assert expected > 0.01
+    assert expected > 0.1
     errors = []
     for h in (1e-3, 5e-4):
         state = 0.6
