@@ -195,7 +195,7 @@ def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
 
 
 @compiled
-def set_links(events, inbox, now_us):  # type: ignore[no-untyped-def]
+def set_links(events, inbox, now_us):
     """Bring all link events up to ``now_us`` into force."""
     while events.position[0] < events.at_us.shape[0] and events.at_us[events.position[0]] <= now_us:
         n = events.position[0]
@@ -208,7 +208,7 @@ def set_links(events, inbox, now_us):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def sense(autopilots, i, message, reported, now_us):  # type: ignore[no-untyped-def]
+def sense(autopilots, i, message, reported, now_us):
     """Own state of UAV ``i`` from its vehicle's message (13,) and the command that it reports in force (4,).
 
     ``reported`` comes as fractions of the travel and is overwritten in rad and N.
@@ -218,7 +218,7 @@ def sense(autopilots, i, message, reported, now_us):  # type: ignore[no-untyped-
 
 
 @compiled
-def sense_and_refer(autopilots, active, messages, reported, now_us, period_us):  # type: ignore[no-untyped-def]
+def sense_and_refer(autopilots, active, messages, reported, now_us, period_us):
     """The first stage of a tick of all ``active``; leaders refer after `hear`, see ``tick.hear_and_control``."""
     for i in range(active.shape[0]):
         if active[i] == 1:
@@ -226,7 +226,7 @@ def sense_and_refer(autopilots, active, messages, reported, now_us, period_us): 
 
 
 @compiled
-def _position_of(autopilots, inbox, i, edge):  # type: ignore[no-untyped-def]
+def _position_of(autopilots, inbox, i, edge):
     """Present forward position of the leader behind in-edge ``edge``, carried on by its speed; nan if never heard."""
     if edge < 0 or inbox.valid[i, edge] == 0.0:
         return math.nan
@@ -241,7 +241,7 @@ def _position_of(autopilots, inbox, i, edge):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lead(autopilots, inbox, i, now_us, period_us):  # type: ignore[no-untyped-def]
+def lead(autopilots, inbox, i, now_us, period_us):
     """A leader's tick: advance the profile of UAV ``i``, set its target and what it shares.
 
     To be called after `hear`: a profile may wait for the position of another leader.

@@ -47,7 +47,7 @@ class Own(NamedTuple):
 
 
 @compiled
-def decode_state(message, t, command, own):  # type: ignore[no-untyped-def]
+def decode_state(message, t, command, own):
     """Flight-path variables, in the order of `Own`, from the fields of the two state messages.
 
     Parameters

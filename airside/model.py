@@ -47,7 +47,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 @compiled
-def airspeed_model(V, gamma, alpha, a):  # type: ignore[no-untyped-def]
+def airspeed_model(V, gamma, alpha, a):
     """f_v (m/s^2) and g_v (1/kg) of V' = f_v + g_v T; abs(alpha) is taken as at most 1 rad in g_v."""
     lifting = 0.5 * a.rho * V * V * a.S
     drift = -lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha) / a.m - a.g * math.sin(gamma)
@@ -55,7 +55,7 @@ def airspeed_model(V, gamma, alpha, a):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def flight_path_model(V, gamma, divisor, a):  # type: ignore[no-untyped-def]
+def flight_path_model(V, gamma, divisor, a):
     """f_g (rad/s) and g_g (1/s) of gamma' = f_g + g_g theta; ``divisor`` is the airspeed guarded against zero."""
     lifting = 0.5 * a.rho * V * V * a.S
     drift = (-a.m * a.g * math.cos(gamma) + lifting * a.CL0 - lifting * a.CLa * gamma) / (a.m * divisor)
@@ -63,7 +63,7 @@ def flight_path_model(V, gamma, divisor, a):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def pitch_rate_model(V, alpha, q, divisor, a):  # type: ignore[no-untyped-def]
+def pitch_rate_model(V, alpha, q, divisor, a):
     """f_q (rad/s^2) and g_q (1/s^2) of q' = f_q + g_q elevator."""
     moment = 0.5 * a.rho * V * V * a.S * a.c / a.Iy
     drift = moment * (a.Cm0 + a.Cma * alpha + a.Cmq * a.c * q / (2.0 * divisor))

@@ -223,9 +223,7 @@ class Crew:
 
     def sense_and_refer(self, tick: int, active: np.ndarray) -> None:
         """Own state from the vehicle's message; the leaders' profiles."""
-        sense_and_refer(
-            self.autopilots, active, self.messages, self.reported, self.now_us(tick), self.timing.period_us
-        )
+        sense_and_refer(self.autopilots, active, self.messages, self.reported, self.now_us(tick), self.timing.period_us)
 
     def hear(self, tick: int, active: np.ndarray) -> None:
         """Link events, then the records that are due, through the channel into the inbox."""

@@ -35,13 +35,13 @@ _COMMANDS = len(scheme.COMMANDS)
 
 
 @compiled
-def _heard(autopilots, inbox, i):  # type: ignore[no-untyped-def]
+def _heard(autopilots, inbox, i):
     n = inbox.degree[i]
     return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
 
 
 @compiled
-def _begin(autopilots, inbox, i, own, reference, gains):  # type: ignore[no-untyped-def]
+def _begin(autopilots, inbox, i, own, reference, gains):
     if autopilots.started[i] == 0:
         model = fields(Model, autopilots.model[i])
         store(_start(own, _heard(autopilots, inbox, i), reference, model, gains), autopilots.state[i])
@@ -49,7 +49,7 @@ def _begin(autopilots, inbox, i, own, reference, gains):  # type: ignore[no-unty
 
 
 @compiled
-def announce(autopilots, inbox, i):  # type: ignore[no-untyped-def]
+def announce(autopilots, inbox, i):
     """Set ``shared`` from the state at this instant, before the law's step (exchange in two phases)."""
     own = fields(Own, autopilots.own[i])
     reference = fields(Reference, autopilots.reference[i])
@@ -60,7 +60,7 @@ def announce(autopilots, inbox, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def control(autopilots, inbox, i, dt):  # type: ignore[no-untyped-def]
+def control(autopilots, inbox, i, dt):
     """Step the law of UAV ``i``: sets state, command, shared values and signals.
 
     Shared values and signals belong to the instant of the measurement. Returns False, and leaves the command as it was,
@@ -86,7 +86,7 @@ def control(autopilots, inbox, i, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):  # type: ignore[no-untyped-def]
+def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):
     """The later stages of a tick of all ``active``: inbox, then the leaders' profiles or the followers' law.
 
     Followers' commands are written to ``controls`` as fractions of travel (k, 4). ``ok`` (k,) tells whose command is

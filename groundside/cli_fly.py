@@ -213,7 +213,9 @@ def doctor(
     table.add_row("Python", sys.version.split()[0], "ok")
     table.add_row("cores", str(cores), "ok" if cores >= 2 else "few")
     load = len(mission.vehicles) * _MS_PER_TICK / (mission.timing.period * 1e3) / cores
-    verdict = "ok" if load < 0.6 else "tight: try --pack auto" if load < 0.9 else "too much: use --pack auto or --speed max"
+    verdict = (
+        "ok" if load < 0.6 else "tight: try --pack auto" if load < 0.9 else "too much: use --pack auto or --speed max"
+    )
     table.add_row(f"load of {mission.name} at speed 1", f"{load:.0%} of the machine", verdict)
     try:
         block = reserve([spec.uav for spec in mission.vehicles])
@@ -233,5 +235,7 @@ def doctor(
     from ftcc.link.compiled import cache_folder
 
     compiled = len(list(cache_folder.rglob("*.nbi")))
-    table.add_row("compiled code", str(cache_folder), f"{compiled} functions" if compiled else "compiled at first start")
+    table.add_row(
+        "compiled code", str(cache_folder), f"{compiled} functions" if compiled else "compiled at first start"
+    )
     console.print(table)

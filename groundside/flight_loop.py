@@ -77,7 +77,7 @@ class Scratch(NamedTuple):
 
 
 @compiled
-def _send(ether, autopilots, events, i, now):  # type: ignore[no-untyped-def]
+def _send(ether, autopilots, events, i, now):
     slot = ether.sent[i] % HISTORY
     ether.stamp[i, slot] = now
     ether.radio_on[i, slot] = events.radio_on[i]
@@ -86,7 +86,7 @@ def _send(ether, autopilots, events, i, now):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _receive(ether, inbox, events, i, now, latency, seed):  # type: ignore[no-untyped-def]
+def _receive(ether, inbox, events, i, now, latency, seed):
     for edge in range(inbox.degree[i]):
         sender = ether.sender[i, edge]
         while inbox.edges[i, edge, 3] < ether.sent[sender]:
@@ -101,7 +101,7 @@ def _receive(ether, inbox, events, i, now, latency, seed):  # type: ignore[no-un
 
 
 @compiled
-def _latch(fleet, autopilots, i, wire, buffer):  # type: ignore[no-untyped-def]
+def _latch(fleet, autopilots, i, wire, buffer):
     """Bring the last command into force."""
     if autopilots.leader[i] == 1:
         copy(autopilots.target[i], fleet.target[i])
@@ -115,8 +115,23 @@ def _latch(fleet, autopilots, i, wire, buffer):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fly(  # type: ignore[no-untyped-def]
-    fleet, autopilots, inbox, events, ether, recording, scratch, period, exchange, latency, step, every, seed, wire, first, last
+def fly(
+    fleet,
+    autopilots,
+    inbox,
+    events,
+    ether,
+    recording,
+    scratch,
+    period,
+    exchange,
+    latency,
+    step,
+    every,
+    seed,
+    wire,
+    first,
+    last,
 ):
     """Fly the ticks first..last-1.
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.launcher import Outcome, Swarm
 from ftcc.groundside.registry import Control, Entry
@@ -41,8 +41,7 @@ class FlightOptions:
     speed: float = 1.0
     pack: int = 1
     held: bool = False
-    viewer: str = "none"
-    """"web", "native" or "none"."""
+    viewer: Literal["web", "native", "none"] = "none"
     open_browser: bool = False
     record_view: bool = True
     """Write ``swarm.rrd``."""
@@ -82,8 +81,11 @@ class _Flight:
         self.refreshed = time.monotonic()
         self.scheduled_events()
         progress(self.station.t)
-        if self.dashboard is not None:
+        # The first picture sets the scale: it waits for everybody, but not for ever.
+        if self.dashboard is not None and (self.station.complete or self.station.t > 1.0):
             self.dashboard.log(self.station.snapshot())
+            for problem in self.dashboard.take_problems():
+                self.note(problem)
 
 
 def fly(

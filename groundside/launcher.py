@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.snapshot import Event
-from ftcc.link.gate import Ended, Gone, Go, Limit, Lost, Pace, Ready, Release, Said, Stop
+from ftcc.link.gate import Ended, Go, Gone, Limit, Lost, Pace, Ready, Release, Said, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
 

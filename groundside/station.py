@@ -88,6 +88,11 @@ class Station:
         elif kind == "STATUSTEXT":
             self.note(Event(heard.t, _SEVERITIES[message.severity & 7], message.text, message.get_srcSystem()))
 
+    @property
+    def complete(self) -> bool:
+        """Whether every UAV has been heard."""
+        return all(heard.truth for heard in self._uavs.values())
+
     def note(self, event: Event) -> None:
         """Add an event to the next snapshot."""
         self._events.append(event)

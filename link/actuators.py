@@ -15,21 +15,21 @@ AILERON, ELEVATOR, RUDDER, THRUST = range(4)
 
 
 @compiled
-def as_sent(values):  # type: ignore[no-untyped-def]
+def as_sent(values):
     """Round ``values`` in place to float32, as a message does."""
     for i in range(values.shape[0]):
         values[i] = float(np.float32(values[i]))
 
 
 @compiled
-def encode_command(command, travel, controls):  # type: ignore[no-untyped-def]
+def encode_command(command, travel, controls):
     """``command`` (rad, N) as fractions of the travel, in float32; an actuator without travel gets 0."""
     for i in range(4):
         controls[i] = float(np.float32(command[i] / travel[i])) if travel[i] > 0.0 else 0.0
 
 
 @compiled
-def decode_command(controls, travel, command):  # type: ignore[no-untyped-def]
+def decode_command(controls, travel, command):
     """The inverse of `encode_command`."""
     for i in range(4):
         command[i] = controls[i] * travel[i]

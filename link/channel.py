@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import CHANNEL, philox, uniform
 
-__all__ = ["Channel", "Edge", "Inbox", "SLOTS", "admit", "hear", "new_inbox"]
+__all__ = ["SLOTS", "Channel", "Edge", "Inbox", "admit", "hear", "new_inbox"]
 
 SLOTS = 32
 """Records that can be under way on one edge at a time."""
@@ -105,14 +105,14 @@ def new_inbox(senders: list[list[int]], receivers: list[int], values: int, chann
 
 
 @compiled
-def _take(inbox, i, edge, stamp, values):  # type: ignore[no-untyped-def]
+def _take(inbox, i, edge, stamp, values):
     if stamp > inbox.stamp[i, edge]:
         inbox.stamp[i, edge] = stamp
         copy(values, inbox.values[i, edge])
 
 
 @compiled
-def admit(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed):  # type: ignore[no-untyped-def]
+def admit(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed):
     """Pass one record through the channel of in-edge ``edge`` of UAV ``i`` (indices) and, if it survives, queue it in the inbox.
 
     To be called in order of sequence, at the first tick ``now`` >= stamp + latency (all in us). ``radio_on`` is false
@@ -161,7 +161,7 @@ def admit(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed)
 
 
 @compiled
-def hear(inbox, i, now):  # type: ignore[no-untyped-def]
+def hear(inbox, i, now):
     """Take from UAV ``i``'s inbox what can be used at ``now`` (us); set validity and age of its in-edges."""
     for edge in range(inbox.degree[i]):
         if inbox.edges[i, edge, 6] > 0:

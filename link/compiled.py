@@ -83,7 +83,7 @@ def fields(cls: Any, values: Any) -> Any:
 
 
 @overload(fields)
-def _fields_compiled(cls, values):  # type: ignore[no-untyped-def]
+def _fields_compiled(cls, values):
     if not isinstance(cls, types.NamedTupleClass):
         return None
     kind = cls.instance_class
@@ -92,21 +92,21 @@ def _fields_compiled(cls, values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def store(record, values):  # type: ignore[no-untyped-def]
+def store(record, values):
     """Write a tuple of floats into the first entries of the vector ``values``; the inverse of `fields`."""
     for i in range(len(record)):
         values[i] = record[i]
 
 
 @compiled
-def copy(source, target):  # type: ignore[no-untyped-def]
+def copy(source, target):
     """Copy the vector ``source`` into the beginning of ``target``; faster when compiled than an assignment of slices."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
 @compiled
-def fill(target, value):  # type: ignore[no-untyped-def]
+def fill(target, value):
     """Set every entry of the vector ``target`` to ``value``."""
     for i in range(target.shape[0]):
         target[i] = value
@@ -125,7 +125,8 @@ def instantiate(template: str, name: str, **names: Any) -> ModuleType:
     if spec is None or spec.origin is None:
         raise ImportError(f"no template module {template}")
     place = importlib.util.spec_from_file_location(full_name, spec.origin)
-    assert place is not None and place.loader is not None
+    assert place is not None
+    assert place.loader is not None
     module = importlib.util.module_from_spec(place)
     module.__dict__.update(names)
     sys.modules[full_name] = module

@@ -74,9 +74,7 @@ class Mesh:
         # A token says "my subscription stands"; the sender waits for it before the flight.
         for uav in own:
             for sender in hears:
-                self._tokens.append(
-                    self._session.liveliness().declare_token(f"{self._prefix}/{uav}/hears/{sender}")
-                )
+                self._tokens.append(self._session.liveliness().declare_token(f"{self._prefix}/{uav}/hears/{sender}"))
 
     def _greeted(self, sample: Any) -> None:
         if sample.kind == self._zenoh.SampleKind.PUT:

@@ -19,7 +19,7 @@ _MASK = 0xFFFFFFFF
 
 
 @compiled
-def philox(seed: int, a: int, b: int, c: int, d: int):  # type: ignore[no-untyped-def]
+def philox(seed: int, a: int, b: int, c: int, d: int):
     """Four 32-bit integers for the 64-bit key ``seed`` and the counter ``(a, b, c, d)`` of 32-bit integers."""
     # Numbers from arrays would warn of the overflow that is meant here.
     a, b, c, d = int(a), int(b), int(c), int(d)
@@ -46,7 +46,7 @@ def uniform(word: int) -> float:
 
 
 @compiled
-def gaussian_pair(u: int, v: int):  # type: ignore[no-untyped-def]
+def gaussian_pair(u: int, v: int):
     """Two independent standard normal numbers from two 32-bit integers (Box and Muller)."""
     radius = math.sqrt(-2.0 * math.log(uniform(u)))
     angle = 2.0 * math.pi * uniform(v)

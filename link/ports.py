@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ftcc.link.mavlink import LOOPBACK
 
-__all__ = ["PortError", "PortBlock", "UavPorts", "reserve", "runtime_folder"]
+__all__ = ["PortBlock", "PortError", "UavPorts", "reserve", "runtime_folder"]
 
 _FIRST, _END = 20000, 32768
 _PER_UAV = 4

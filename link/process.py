@@ -151,6 +151,8 @@ def process_main(name: str, pipe: Connection, setting: Setting, run: Callable[..
             traceback.print_exc()
             code = 1
         used = resource.getrusage(resource.RUSAGE_SELF)
-        print(f"used {used.ru_utime:.2f} s user, {used.ru_stime:.2f} s system, {used.ru_maxrss / 1024:.0f} MB", flush=True)
+        print(
+            f"used {used.ru_utime:.2f} s user, {used.ru_stime:.2f} s system, {used.ru_maxrss / 1024:.0f} MB", flush=True
+        )
     # Skip the interpreter's clean-up: files are closed, and foreign threads must not keep a process alive.
     os._exit(code)

@@ -45,7 +45,9 @@ class Record:
         if not all(map(math.isfinite, self.values)):
             raise RecordError(f"UAV {self.uav} would share a value that is not finite: {self.values}")
         flags = (_RADIO_ON if self.radio_on else 0) | (_LAST if self.last else 0)
-        header = _HEADER.pack(RECORD_VERSION, self.uav, flags, len(self.values), self.sequence, self.stamp_us, self.heard)
+        header = _HEADER.pack(
+            RECORD_VERSION, self.uav, flags, len(self.values), self.sequence, self.stamp_us, self.heard
+        )
         return header + struct.pack(f"<{len(self.values)}d", *self.values)
 
     @classmethod

@@ -41,7 +41,7 @@ class Airframe(NamedTuple):
 
 
 @compiled
-def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):  # type: ignore[no-untyped-def]
+def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
     """Rates of (V, x, z, gamma, theta, q), eqs. (2.8)-(2.12).
 
     Parameters

@@ -11,7 +11,7 @@ __all__ = ["fly_period", "report_state"]
 
 
 @compiled
-def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, controls):  # type: ignore[no-untyped-def]
+def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, controls):
     """Truth (k, 13), state messages (k, 13) and command in force (k, 4, fractions) of the living at this tick."""
     for i in range(alive.shape[0]):
         if alive[i] == 1:
@@ -23,7 +23,7 @@ def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, control
 
 
 @compiled
-def fly_period(fleet, alive, now_us, period_us, step_us, why):  # type: ignore[no-untyped-def]
+def fly_period(fleet, alive, now_us, period_us, step_us, why):
     """Fly the living for one period; ``why`` (k,) is set to a key of ``plant.LOST``."""
     for i in range(alive.shape[0]):
         if alive[i] == 1:

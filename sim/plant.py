@@ -124,7 +124,7 @@ def _onset(since: float, rate: float) -> float:
 
 
 @compiled
-def _fault(fleet, i, actuator, time):  # type: ignore[no-untyped-def]
+def _fault(fleet, i, actuator, time):
     """Effectiveness and bias of an actuator: those of its latest fault."""
     effectiveness = 1.0
     bias = 0.0
@@ -137,7 +137,7 @@ def _fault(fleet, i, actuator, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _disturbance(fleet, i, channel, time):  # type: ignore[no-untyped-def]
+def _disturbance(fleet, i, channel, time):
     total = 0.0
     for n in range(fleet.disturbances.shape[1]):
         since = time - fleet.disturbances[i, n, 0]
@@ -147,12 +147,12 @@ def _disturbance(fleet, i, channel, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _saturated(fleet, i, actuator):  # type: ignore[no-untyped-def]
+def _saturated(fleet, i, actuator):
     return min(max(fleet.command[i, actuator], fleet.limits[i, actuator, 0]), fleet.limits[i, actuator, 1])
 
 
 @compiled
-def actuate(fleet, i, time):  # type: ignore[no-untyped-def]
+def actuate(fleet, i, time):
     """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; to be called after each latch."""
     for actuator in range(4):
         effectiveness, bias = _fault(fleet, i, actuator, time)
@@ -164,7 +164,7 @@ def actuate(fleet, i, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stroke(fleet, i, actuator, time, half, full):  # type: ignore[no-untyped-def]
+def _stroke(fleet, i, actuator, time, half, full):
     """Acting deflection at the beginning, middle and end of a step; the lag is integrated exactly.
 
     ``half`` and ``full`` are exp(-lag h/2) and exp(-lag h); a fault is taken at the middle of the step.
@@ -186,7 +186,7 @@ def _stroke(fleet, i, actuator, time, half, full):  # type: ignore[no-untyped-de
 
 
 @compiled
-def advance(fleet, i, start_us, period_us, step_us):  # type: ignore[no-untyped-def]
+def advance(fleet, i, start_us, period_us, step_us):
     """Fly vehicle ``i`` for one period from ``start_us`` (us) with the command in force, in RK4 steps of ``step_us``.
 
     Returns
@@ -211,15 +211,9 @@ def advance(fleet, i, start_us, period_us, step_us):  # type: ignore[no-untyped-
         d3 = _disturbance(fleet, i, 2, middle)
         s0, s3, s4, s5 = x[0], x[3], x[4], x[5]
         r1 = longitudinal_rates(s0, s3, s4, s5, t0, e0, d1, d2, d3, a)
-        r2 = longitudinal_rates(
-            s0 + k * r1[0], s3 + k * r1[3], s4 + k * r1[4], s5 + k * r1[5], t1, e1, d1, d2, d3, a
-        )
-        r3 = longitudinal_rates(
-            s0 + k * r2[0], s3 + k * r2[3], s4 + k * r2[4], s5 + k * r2[5], t1, e1, d1, d2, d3, a
-        )
-        r4 = longitudinal_rates(
-            s0 + h * r3[0], s3 + h * r3[3], s4 + h * r3[4], s5 + h * r3[5], t2, e2, d1, d2, d3, a
-        )
+        r2 = longitudinal_rates(s0 + k * r1[0], s3 + k * r1[3], s4 + k * r1[4], s5 + k * r1[5], t1, e1, d1, d2, d3, a)
+        r3 = longitudinal_rates(s0 + k * r2[0], s3 + k * r2[3], s4 + k * r2[4], s5 + k * r2[5], t1, e1, d1, d2, d3, a)
+        r4 = longitudinal_rates(s0 + h * r3[0], s3 + h * r3[3], s4 + h * r3[4], s5 + h * r3[5], t2, e2, d1, d2, d3, a)
         for j in range(6):
             x[j] += h / 6.0 * (r1[j] + 2.0 * r2[j] + 2.0 * r3[j] + r4[j])
         if not (x[0] >= fleet.guards[i, 0]):
@@ -232,7 +226,7 @@ def advance(fleet, i, start_us, period_us, step_us):  # type: ignore[no-untyped-
 
 
 @compiled
-def _aircraft_truth(fleet, i, out):  # type: ignore[no-untyped-def]
+def _aircraft_truth(fleet, i, out):
     for n in range(out.shape[0]):
         out[n] = 0.0
     out[V], out[X], out[Z] = fleet.state[i, 0], fleet.state[i, 1], fleet.state[i, 2]
@@ -242,7 +236,7 @@ def _aircraft_truth(fleet, i, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _point_truth(fleet, i, time, out):  # type: ignore[no-untyped-def]
+def _point_truth(fleet, i, time, out):
     """A `reference_point` moves at constant velocity from the stamp of its target on."""
     target = fleet.target[i]
     since = time - target[0]
@@ -260,7 +254,7 @@ def _point_truth(fleet, i, time, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def truth(fleet, i, time, out):  # type: ignore[no-untyped-def]
+def truth(fleet, i, time, out):
     """Write the state of vehicle ``i`` at ``time`` (s) into ``out``, in the order of `TRUTH`."""
     if fleet.point[i] == 1:
         _point_truth(fleet, i, time, out)

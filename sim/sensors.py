@@ -8,7 +8,7 @@ import numpy as np
 
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import NOISE, gaussian_pair, philox
-from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, P, Q, R, THETA, TRUTH, V, X, Y, Z
+from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, THETA, TRUTH, P, Q, R, V, X, Y, Z
 
 __all__ = ["STATE_MESSAGE", "encode_state", "measure"]
 
@@ -19,7 +19,7 @@ _CHANNELS = len(TRUTH)
 
 
 @compiled
-def _add_noise(measured, deviation, seed, uav, tick):  # type: ignore[no-untyped-def]
+def _add_noise(measured, deviation, seed, uav, tick):
     """Add white noise to ``measured`` (order of `TRUTH`) with the given standard deviations, drawn for this tick.
 
     The angle of attack stays the difference of pitch and flight-path angle, as measured.
@@ -39,7 +39,7 @@ def _add_noise(measured, deviation, seed, uav, tick):  # type: ignore[no-untyped
 
 
 @compiled
-def _times(a0, a1, a2, a3, b0, b1, b2, b3):  # type: ignore[no-untyped-def]
+def _times(a0, a1, a2, a3, b0, b1, b2, b3):
     """Product of two quaternions."""
     return (
         a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
@@ -50,23 +50,17 @@ def _times(a0, a1, a2, a3, b0, b1, b2, b3):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def encode_state(measured, out):  # type: ignore[no-untyped-def]
+def encode_state(measured, out):
     """Turn ``measured`` (order of `TRUTH`) into the fields of `STATE_MESSAGE`, rounded to float32 as on the wire.
 
     The attitude is the path frame (chi, gamma, mu) turned by sideslip and angle of attack; north-east-down.
     """
     cos_gamma = math.cos(measured[GAMMA])
     q0, q1, q2, q3 = math.cos(0.5 * measured[CHI]), 0.0, 0.0, math.sin(0.5 * measured[CHI])
-    q0, q1, q2, q3 = _times(
-        q0, q1, q2, q3, math.cos(0.5 * measured[GAMMA]), 0.0, math.sin(0.5 * measured[GAMMA]), 0.0
-    )
+    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[GAMMA]), 0.0, math.sin(0.5 * measured[GAMMA]), 0.0)
     q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[MU]), math.sin(0.5 * measured[MU]), 0.0, 0.0)
-    q0, q1, q2, q3 = _times(
-        q0, q1, q2, q3, math.cos(0.5 * measured[BETA]), 0.0, 0.0, -math.sin(0.5 * measured[BETA])
-    )
-    q0, q1, q2, q3 = _times(
-        q0, q1, q2, q3, math.cos(0.5 * measured[ALPHA]), 0.0, math.sin(0.5 * measured[ALPHA]), 0.0
-    )
+    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[BETA]), 0.0, 0.0, -math.sin(0.5 * measured[BETA]))
+    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[ALPHA]), 0.0, math.sin(0.5 * measured[ALPHA]), 0.0)
     out[0], out[1], out[2], out[3] = q0, q1, q2, q3
     out[4], out[5], out[6] = measured[P], measured[Q], measured[R]
     out[7], out[8], out[9] = measured[X], measured[Y], -measured[Z]
@@ -78,7 +72,7 @@ def encode_state(measured, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def measure(fleet, i, tick, seed, true, out):  # type: ignore[no-untyped-def]
+def measure(fleet, i, tick, seed, true, out):
     """``true`` with the noise of vehicle ``i`` at this tick."""
     copy(true, out)
     _add_noise(out, fleet.noise[i], seed, fleet.uav[i], tick)

@@ -182,7 +182,7 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
 
 
 @compiled
-def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[no-untyped-def]
+def _substep(s, own, heard, reference, model, gains, h, ahead):
     """One Euler step of length h, everything from the states at its beginning."""
     V = own.V
     divisor = max(V, _LEAST_AIRSPEED)
@@ -284,7 +284,7 @@ def _substep(s, own, heard, reference, model, gains, h, ahead):  # type: ignore[
 
 
 @compiled
-def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
     """One tick: the state ``dt`` later, and the output of the first sub-step."""
     h = dt / gains.substeps
     after, output = _substep(state, own, heard, reference, model, gains, h, 0.0)
@@ -294,13 +294,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 
 @compiled
-def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """What the neighbours hear, for the instant of ``state``."""
     return state.zhat, (state.v_r if gains.shaper > 0.0 else output.zhat_rate)
 
 
 @compiled
-def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
     return (
         state.zhat,

@@ -303,7 +303,7 @@ def test_the_shipped_forms_break_no_condition():
 @pytest.mark.parametrize(
     ("gains", "because"),
     [
-        ({"k31": 0.0}, "gain k31 = 0.0: must be > 0"),
+        ({"k31": 0.0}, "gain k31 = 0: must be > 0"),
         ({"e1": -0.01}, "gain e1 = -0.01: must be > 0"),
         ({"beta2": 1.9}, "must exceed the leaders' largest climb rate, 1.970 m/s"),
         ({"substeps": 0.0}, "gain substeps = 0.0: must be a whole number >= 1"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import select
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -59,13 +60,20 @@ def test_a_state_of_which_a_part_was_dropped_does_not_shift_those_after_it(bench
     assert taken(bench) == [1, 2]
 
 
-def test_a_vehicle_that_is_lost_ends_its_autopilot(bench):
+def test_an_autopilot_whose_aircraft_is_lost_answers_the_states_before_that_and_ends(bench):
     lost = dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_FIXED_WING, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_FLIGHT_TERMINATION, 3
     )
-    bench.vehicle.send(*state(0), lost)
-    taken(bench)
-    assert not bench.crew.alive.any()
+    for tick in range(3):
+        bench.vehicle.send(*state(tick))
+    bench.vehicle.send(lost)
+    with bench:
+        until = time.monotonic() + 10.0
+        while bench.crew.alive.any() and time.monotonic() < until:
+            time.sleep(0.001)
+        assert not bench.crew.alive.any(), "nobody need stop it"
+    stamps = [read_command(message, np.zeros(4)) for message in bench.vehicle.receive()]
+    assert list(dict.fromkeys(stamps)) == [0, 10_000, 20_000]
 
 
 def test_every_state_is_answered_with_its_own_stamp_and_a_repeated_one_once_more(bench):

@@ -12,14 +12,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from ftcc.airside.autopilots import build, tick_of
-from ftcc.groundside.mission import resolve
+from ftcc.groundside.mission import Mission, resolve
 from ftcc.groundside.scenario import load
 from ftcc.groundside.simulate import fly, simulate
 
@@ -44,11 +44,15 @@ def in_one_process(table: Table, folder: Path) -> None:
     """Simulations of the whole containment scenario."""
     for form in ("flight", "monograph"):
         mission = resolve(load("containment", form=form))
-        flown = median(lambda mission=mission: fly(mission))
+        flown = median(partial(fly, mission))
         table.add_row(f"simulate containment, {form}, 400 s", f"{flown:.2f} s", f"{400.0 / flown:.0f} x real time")
-        count = iter(range(100))
-        recorded = median(lambda mission=mission, count=count: simulate(mission, folder / f"{form}{next(count)}"))
+        recorded = median(partial(simulate_anew, mission, folder))
         table.add_row("   the same with its recording", f"{recorded:.2f} s", "")
+
+
+def simulate_anew(mission: Mission, folder: Path) -> None:
+    """Simulate and record in a new folder."""
+    simulate(mission, Path(tempfile.mkdtemp(dir=folder)) / "run")
 
 
 def with_processes(table: Table, folder: Path) -> None:
@@ -74,41 +78,34 @@ def with_processes(table: Table, folder: Path) -> None:
 
 def start_up(table: Table, folder: Path) -> None:
     """Whole commands whose flight takes next to nothing."""
-    for name, arguments in (
-        ("simulate", ["simulate", "containment", "--duration", "0.1"]),
-        ("fly", ["fly", "containment", "--speed", "max", "--viewer", "none", "--duration", "0.1"]),
-    ):
-        count = iter(range(100))
-        command = [*FTCC, *arguments, "--out"]
-        whole = median(
-            lambda command=command, name=name, count=count: subprocess.run(
-                [*command, str(folder / f"start-{name}{next(count)}")], capture_output=True, check=True
-            )
-        )
-        table.add_row(f"ftcc {name} of 0.1 s, whole command", f"{whole:.2f} s", "")
+    flags = {"simulate": [], "fly": ["--speed", "max", "--viewer", "none"]}
+    for command, more in flags.items():
+        whole = median(partial(run_anew, [*FTCC, command, "containment", "--duration", "0.1", *more], folder))
+        table.add_row(f"ftcc {command} of 0.1 s, whole command", f"{whole:.2f} s", "")
 
 
-def law_step(table: Table) -> None:
-    """One tick of one follower's law (two sub-steps), called from Python, and as plain Python."""
+def run_anew(command: list[str], folder: Path) -> None:
+    """Run a command with a new run folder."""
+    subprocess.run([*command, "--out", f"{tempfile.mkdtemp(dir=folder)}/run"], capture_output=True, check=True)
+
+
+def law_step() -> float:
+    """Time of one tick of one follower's law (two sub-steps), called from Python, s."""
     mission = resolve(load("containment", form="flight"))
-    for mode in ("compiled, called from Python", "plain Python"):
-        autopilots, inbox = build(mission.autopilots[:1], mission.timing)
-        autopilots.own[0, 3:5] = 1000.0, 30.0
-        control = tick_of("containment").control
-        if mode == "plain Python":
-            code = (
-                "import tests.bench.__main__ as b; from rich.table import Table; t = Table('a', 'b', 'c'); "
-                "b.law_step(t); print(list(t.columns[1].cells)[0])"
-            )
-            environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-            run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
-            table.add_row(f"law of containment, {mode}", run.stdout.strip(), "")
-            return
-        control(autopilots, inbox, 0, 0.01)
-        times = [seconds(lambda: control(autopilots, inbox, 0, 0.01)) for _ in range(2000)]
-        table.add_row(f"law of containment, {mode}", f"{1e6 * np.median(times):.1f} us", "")
-        if os.environ.get("NUMBA_DISABLE_JIT"):
-            return
+    autopilots, inbox = build(mission.autopilots[:1], mission.timing)
+    autopilots.own[0, 3:5] = 1000.0, 30.0
+    step = partial(tick_of("containment").control, autopilots, inbox, 0, 0.01)
+    step()
+    return statistics.median(seconds(step) for _ in range(2000))
+
+
+def laws(table: Table) -> None:
+    """One tick of the law, compiled and as plain Python."""
+    code = "from tests.bench.__main__ import law_step; print(law_step())"
+    for name, disable in (("compiled, called from Python", "0"), ("plain Python", "1")):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disable}
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+        table.add_row(f"law of containment, {name}", f"{1e6 * float(run.stdout):.1f} us", "")
 
 
 def main() -> None:
@@ -116,7 +113,7 @@ def main() -> None:
     table = Table("what", "measured", "", box=None)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        law_step(table)
+        laws(table)
         in_one_process(table, folder)
         start_up(table, folder)
         with_processes(table, folder)

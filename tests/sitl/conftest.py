@@ -78,13 +78,13 @@ class Flight:
         return list((self.folder / "parts").glob("*.arrows"))
 
 
-@pytest.fixture()
+@pytest.fixture
 def environment(tmp_path: Path) -> dict[str, str]:
     """The environment of a user of this test alone: running swarms are listed apart from everybody else's."""
     return {**os.environ, "FTCC_RUNTIME_DIR": str(tmp_path / "runtime")}
 
 
-@pytest.fixture()
+@pytest.fixture
 def fly(tmp_path: Path, environment: dict[str, str]) -> Iterator[Callable[..., Flight]]:
     """Start `ftcc fly` with arguments; whatever still runs at the end of the test is killed."""
     flights: list[Flight] = []
@@ -104,7 +104,7 @@ def fly(tmp_path: Path, environment: dict[str, str]) -> Iterator[Callable[..., F
                     process.kill()
 
 
-@pytest.fixture()
+@pytest.fixture
 def ftcc(environment: dict[str, str]) -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run an `ftcc` command to its end."""
 

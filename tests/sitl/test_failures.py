@@ -130,7 +130,9 @@ def test_a_given_port_in_use_is_refused_before_anything_starts(ftcc: Ftcc, tmp_p
     assert not (tmp_path / "run").exists()
 
 
-def test_an_aircraft_that_leaves_its_model_is_lost_and_the_others_fly_on(fly: Callable[..., Flight], ftcc: Ftcc) -> None:
+def test_an_aircraft_that_leaves_its_model_is_lost_and_the_others_fly_on(
+    fly: Callable[..., Flight], ftcc: Ftcc
+) -> None:
     hard_over = "faults=[{at=5.0, uav=2, actuator='elevator', effectiveness=0.05, bias=0.6, without_trim=true}]"
     flight = fly("containment", "--speed", "max", "--duration", "20", "--set", hard_over)
     assert flight.wait() == 1

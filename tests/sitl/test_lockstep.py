@@ -34,7 +34,7 @@ def burn() -> None:
         sum(range(1000))
 
 
-@pytest.fixture()
+@pytest.fixture
 def busy_machine() -> Iterator[None]:
     """Two processes that take what they can get of both cores."""
     workers = [multiprocessing.get_context("spawn").Process(target=burn, daemon=True) for _ in range(2)]
