@@ -1,7 +1,7 @@
 """One tick of an autopilot: the stages between what was received and what is sent. A template, see `link.compiled`.
 
 The free name ``scheme`` is the module of the control law. `autopilots.tick_of` gives this module with a scheme filled
-in. The functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation alike.
+in. The functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation.
 """
 
 from __future__ import annotations

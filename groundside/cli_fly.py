@@ -7,7 +7,7 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast, get_args
 
 import typer
 from rich.console import Console
@@ -82,9 +82,11 @@ def fly(
     port: Annotated[int | None, typer.Option(help="First port of the swarm's block; default: a free one.")] = None,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
+    from ftcc.groundside.fly import Viewer
+
     factor = _speed(speed)
-    if viewer not in ("web", "native", "none"):
-        fail(f"--viewer {viewer}: must be web, native or none")
+    if viewer not in get_args(Viewer):
+        fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     if not mission.wire:
         fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
@@ -101,7 +103,7 @@ def fly(
     except PortError as error:
         folder.rmdir()
         fail(str(error))
-    options = FlightOptions(folder, factor is None, factor or 1.0, count, hold, viewer, browser)
+    options = FlightOptions(folder, factor is None, factor or 1.0, count, hold, cast(Viewer, viewer), browser)
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"), console=console
     )

@@ -24,7 +24,10 @@ from ftcc.link.recording import EventLog
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
 
-__all__ = ["FlightOptions", "fly"]
+__all__ = ["FlightOptions", "Viewer", "fly"]
+
+Viewer = Literal["web", "native", "none"]
+"""Where a swarm is shown."""
 
 _REFRESH = 0.1
 """Least period of the dashboard and of progress, wall s."""
@@ -41,7 +44,7 @@ class FlightOptions:
     speed: float = 1.0
     pack: int = 1
     held: bool = False
-    viewer: Literal["web", "native", "none"] = "none"
+    viewer: Viewer = "none"
     open_browser: bool = False
     record_view: bool = True
     """Write ``swarm.rrd``."""

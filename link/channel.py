@@ -84,7 +84,7 @@ class Inbox(NamedTuple):
 
 
 def new_inbox(senders: list[list[int]], receivers: list[int], values: int, channel: Channel) -> Inbox:
-    """An empty inbox for ``receivers`` (ids), each hearing its list of ``senders``; records carry ``values`` numbers."""
+    """An empty inbox for ``receivers`` (ids), each with its list of ``senders``; records carry ``values`` numbers."""
     k, n = len(receivers), max(1, *(len(row) for row in senders))
     edges = np.zeros((k, n, len(Edge._fields)), np.int64)
     for i, row in enumerate(senders):
@@ -113,7 +113,7 @@ def _take(inbox, i, edge, stamp, values):
 
 @compiled
 def admit(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed):
-    """Pass one record through the channel of in-edge ``edge`` of UAV ``i`` (indices) and, if it survives, queue it in the inbox.
+    """Pass one record through the channel of in-edge ``edge`` of UAV ``i`` (indices) and, if it survives, keep it.
 
     To be called in order of sequence, at the first tick ``now`` >= stamp + latency (all in us). ``radio_on`` is false
     where the sender's or the receiver's radio is off. The burst chain also steps for the records that were skipped.

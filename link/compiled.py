@@ -100,7 +100,7 @@ def store(record, values):
 
 @compiled
 def copy(source, target):
-    """Copy the vector ``source`` into the beginning of ``target``; faster when compiled than an assignment of slices."""
+    """Copy the vector ``source`` into the beginning of ``target``; an assignment of slices would allocate."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
