@@ -13,7 +13,7 @@ __all__ = ["above_leaders_climb", "largest_degree", "positive", "stable_in_steps
 def positive(gains: Any, names: str) -> list[Problem]:
     """Every gain of ``names`` (separated by spaces) must be > 0."""
     return [
-        Problem(True, f"gain {name} = {getattr(gains, name)}: must be > 0")
+        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
         for name in names.split()
         if not getattr(gains, name) > 0.0
     ]

@@ -107,7 +107,9 @@ class Crew:
         self.reported = np.zeros((k, 4))
         self.controls = np.zeros((k, 4))
         self.ok = np.ones(k, np.int64)
-        self.states: list[collections.deque[tuple[int, np.ndarray, np.ndarray]]] = [collections.deque() for _ in specs]
+        self.states: list[collections.deque[tuple[int, np.ndarray, np.ndarray | None]]] = [
+            collections.deque() for _ in specs
+        ]
         self.done = np.full(k, -1, np.int64)
         """Last tick of each autopilot."""
         self.ending: set[int] = set()
@@ -190,7 +192,7 @@ class Crew:
                 return
             for i in range(len(self.specs)):
                 if self.alive[i]:
-                    _, self.messages[i], self.reported[i] = self.states[i].popleft()
+                    self.take_state(i)
             self.tick(tick, self.alive)
 
     def fly_in_real_time(self) -> None:
@@ -201,13 +203,22 @@ class Crew:
             self.take_records()
             for i in range(len(self.specs)):
                 while self.alive[i] and self.states[i]:
-                    tick, self.messages[i], self.reported[i] = self.states[i].popleft()
+                    tick = self.take_state(i)
                     one[:] = 0
                     one[i] = 1
                     self.tick(tick, one)
             self.end_the_lost()
             if (self.done[self.alive == 1] >= self.timing.ticks).all():
                 return
+
+    def take_state(self, i: int) -> int:
+        """The next state of vehicle ``i`` becomes the present one; its tick.
+
+        Where the vehicle does not say which command is in force, it is the one that answers its last state.
+        """
+        tick, self.messages[i], controls = self.states[i].popleft()
+        self.reported[i] = self.controls[i] if controls is None else controls
+        return tick
 
     # The tick.
 
@@ -356,11 +367,12 @@ class Crew:
                 messages = messages[1:]
                 continue
             state, controls = np.zeros(13), np.zeros(4)
-            tick = read_state(messages[:3], state, controls) // self.timing.period_us
-            messages = messages[3:] if tick >= 0 else messages[1:]
+            stamp, used = read_state(messages, state, controls)
+            messages = messages[used:]
+            tick = stamp // self.timing.period_us
             newest = self.states[i][-1][0] if self.states[i] else int(self.done[i])
             if tick > newest:
-                self.states[i].append((tick, state, controls))
+                self.states[i].append((tick, state, controls if used == 3 else None))
             elif tick == self.done[i] >= 0:
                 self.vehicles[i].send_again()
 

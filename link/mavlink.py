@@ -187,35 +187,43 @@ def _finite(message: Any) -> bool:
         return all(math.isfinite(value if isinstance(value, float | int) else sum(value)) for value in values)
 
 
-def state_messages(stamp_us: int, state: NDArray[np.float64], controls: NDArray[np.float64]) -> tuple[Any, Any, Any]:
-    """What a vehicle tells its autopilot at every tick: attitude, position, and the command in force.
+def state_messages(stamp_us: int, state: NDArray[np.float64], controls: NDArray[np.float64] | None) -> tuple[Any, ...]:
+    """What a vehicle tells its autopilot at every tick: attitude and position, and what is in force.
 
-    ``state`` (13,) holds the fields of the two state messages, ``controls`` (4,) the command as fractions of travel.
+    ``state`` (13,) holds the fields of the two state messages. ``controls`` (4,), the command in force as fractions of
+    travel, is told where it is not the one that answers the last state, which the autopilot knows; otherwise None.
     """
     stamp = stamp_us // 1000
     v = state.tolist()
-    return (
-        dialect.MAVLink_attitude_quaternion_message(stamp, v[0], v[1], v[2], v[3], v[4], v[5], v[6]),
-        dialect.MAVLink_local_position_ned_message(stamp, v[7], v[8], v[9], v[10], v[11], v[12]),
-        command_message(stamp_us, controls),
-    )
+    attitude = dialect.MAVLink_attitude_quaternion_message(stamp, v[0], v[1], v[2], v[3], v[4], v[5], v[6])
+    position = dialect.MAVLink_local_position_ned_message(stamp, v[7], v[8], v[9], v[10], v[11], v[12])
+    if controls is None:
+        return attitude, position
+    return attitude, position, command_message(stamp_us, controls)
 
 
-def read_state(messages: Sequence[Any], state: NDArray[np.float64], controls: NDArray[np.float64]) -> int:
-    """The inverse of `state_messages`: fills ``state`` and ``controls``; the stamp in us, or -1 if incomplete."""
-    if len(messages) != 3:
-        return -1
-    attitude, position, force = messages
-    a, p = attitude, position
-    if (a.get_type(), p.get_type(), force.get_type()) != (
-        "ATTITUDE_QUATERNION",
-        "LOCAL_POSITION_NED",
-        "HIL_ACTUATOR_CONTROLS",
-    ) or not (a.time_boot_ms == p.time_boot_ms == force.time_usec // 1000):
-        return -1
+def read_state(messages: Sequence[Any], state: NDArray[np.float64], controls: NDArray[np.float64]) -> tuple[int, int]:
+    """The inverse of `state_messages`, from the beginning of ``messages``.
+
+    Fills ``state``, and ``controls`` where they were told.
+
+    Returns
+    -------
+    stamp, used : int
+        The stamp in us, or -1 if the messages do not begin with a state; the number of messages that belong to it.
+    """
+    if len(messages) < 2:
+        return -1, 1
+    a, p = messages[0], messages[1]
+    if a.get_type() != "ATTITUDE_QUATERNION" or p.get_type() != "LOCAL_POSITION_NED":
+        return -1, 1
+    if a.time_boot_ms != p.time_boot_ms:
+        return -1, 2
     state[:] = (a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
-    controls[:] = force.controls[:4]
-    return int(force.time_usec)
+    stamp = int(a.time_boot_ms) * 1000
+    if len(messages) > 2 and read_command(messages[2], controls) == stamp:
+        return stamp, 3
+    return stamp, 2
 
 
 def command_message(stamp_us: int, controls: NDArray[np.float64]) -> Any:

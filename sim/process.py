@@ -108,6 +108,9 @@ class Vehicles:
         self.stall = Stall()
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
+        self.patience = Waiter()
+        """Waits for the launcher alone."""
+        self.patience.add(gate, gate.read)
         for i, pilot in enumerate(self.pilots):
             self.waiter.add(pilot, functools.partial(self.listen, i))
         load_compiled(self.fleet)
@@ -151,9 +154,10 @@ class Vehicles:
             elif not self.setting.lockstep:
                 rest = self.gate.due(self.tick, self.timing.period) - time.monotonic()
                 if rest <= 0.0:
+                    # What has come meanwhile is read now: a wake-up costs more than the reading.
                     self.waiter.wait(0.0)
                     return True
-                self.waiter.wait(rest)
+                self.patience.wait(rest)
             else:
                 missing = self.missing()
                 if not missing:
@@ -194,16 +198,19 @@ class Vehicles:
         """Bring the newest commands into force; one that does not answer the last state is late."""
         if self.tick == 0:
             return
-        wanted = self.now_us - self.timing.period_us
         for i, spec in enumerate(self.specs):
             if self.alive[i]:
-                self.late[i] += int(self.answered[i] < wanted)
+                self.late[i] += int(not self.answers_last(i))
                 if self.answered[i] < 0:
                     continue
                 if spec.kind == "reference_point":
                     self.fleet.target[i] = self.targets[i]
                 else:
                     decode_command(self.received[i], self.fleet.travel[i], self.fleet.command[i])
+
+    def answers_last(self, i: int) -> bool:
+        """Whether the command in force of vehicle ``i`` answers its last state."""
+        return self.tick > 0 and self.answered[i] == self.now_us - self.timing.period_us
 
     def send_state(self) -> None:
         """Measure and tell the autopilots."""
@@ -220,7 +227,8 @@ class Vehicles:
         )
         for i, pilot in enumerate(self.pilots):
             if self.alive[i]:
-                pilot.send(*state_messages(self.now_us, self.messages[i], self.controls[i]))
+                told = None if self.answers_last(i) else self.controls[i]
+                pilot.send(*state_messages(self.now_us, self.messages[i], told))
 
     def record(self) -> None:
         """Append a row of truth to each part."""
@@ -273,3 +281,4 @@ class Vehicles:
         for endpoint in (*self.pilots, *self.station):
             endpoint.close()
         self.waiter.close()
+        self.patience.close()

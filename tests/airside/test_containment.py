@@ -303,10 +303,10 @@ def test_the_shipped_forms_break_no_condition():
 @pytest.mark.parametrize(
     ("gains", "because"),
     [
-        ({"k31": 0.0}, "gain k31 = 0: must be > 0"),
+        ({"k31": -0.5}, "gain k31 = -0.5: must be > 0"),
         ({"e1": -0.01}, "gain e1 = -0.01: must be > 0"),
         ({"beta2": 1.9}, "must exceed the leaders' largest climb rate, 1.970 m/s"),
-        ({"substeps": 0.0}, "gain substeps = 0.0: must be a whole number >= 1"),
+        ({"substeps": 0.5}, "gain substeps = 0.5: must be a whole number >= 1"),
         ({"substeps": 1.5}, "gain substeps = 1.5: must be a whole number >= 1"),
         ({"e2": 0.002}, "gain e2: its rate 500 1/s is unstable in Euler steps of 5 ms"),
         ({"phi": 0.01}, "beta1, beta2 / phi: its rate 554 1/s is unstable in Euler steps of 5 ms"),

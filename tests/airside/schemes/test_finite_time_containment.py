@@ -150,7 +150,7 @@ def test_both_forms_pass():
 @pytest.mark.parametrize(
     ("gains", "words"),
     [
-        ({"k61": 0.0}, "gain k61 = 0.0: must be > 0"),
+        ({"k61": 0.0}, "gain k61 = 0: must be > 0"),
         ({"r": 1.0}, "gain r = 1: an exponent of a finite-time term is in (0, 1)"),
         ({"a": 0.0}, "gain a = 0: an exponent"),
         ({"b3": -0.1}, "gain b3 = -0.1: must be >= 0"),

@@ -147,7 +147,7 @@ def test_flight_form_passes_with_a_word_on_condition_4_63():
 @pytest.mark.parametrize(
     ("gains", "period", "words"),
     [
-        ({"k21": -1.0}, 0.005, "gain k21 = -1.0: must be > 0"),
+        ({"k21": -1.0}, 0.005, "gain k21 = -1: must be > 0"),
         ({}, 0.025, "gain k51, k52: its rate 86 1/s is unstable in Euler steps of 25 ms"),
         ({"oldest": 0.08}, 0.005, "exchange period plus the latency"),
     ],

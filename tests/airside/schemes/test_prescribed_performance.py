@@ -135,7 +135,7 @@ def test_start_outside_of_the_tube_is_refused():
 @pytest.mark.parametrize(
     ("gains", "facts", "words"),
     [
-        ({"k31": 0.0}, {}, "gain k31 = 0.0: must be > 0"),
+        ({"k31": 0.0}, {}, "gain k31 = 0: must be > 0"),
         ({}, {"leader_climb": 4.5}, "gain beta2 = 4 m/s: must exceed the leaders' largest climb rate"),
         ({}, {"leader_climb": 3.5}, "gain observer_limit"),
         ({"tube_last": 3.0}, {}, "must not widen"),
