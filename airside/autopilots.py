@@ -41,7 +41,7 @@ __all__ = [
     "lead",
     "link_events",
     "sense",
-    "sense_and_refer",
+    "sense_all",
     "set_links",
     "tick_of",
 ]
@@ -218,8 +218,8 @@ def sense(autopilots, i, message, reported, now_us):
 
 
 @compiled
-def sense_and_refer(autopilots, active, messages, reported, now_us, period_us):
-    """The first stage of a tick of all ``active``; leaders refer after `hear`, see ``tick.hear_and_control``."""
+def sense_all(autopilots, active, messages, reported, now_us):
+    """The first stage of a tick of all ``active``."""
     for i in range(active.shape[0]):
         if active[i] == 1:
             sense(autopilots, i, messages[i], reported[i], now_us)

@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, LinkEvents, build, link_events, sense_and_refer, set_links, tick_of
+from ftcc.airside.autopilots import Autopilots, LinkEvents, build, link_events, sense_all, set_links, tick_of
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.airside.telemetry import Reporter
@@ -67,7 +67,7 @@ def load_compiled(autopilots: Autopilots, inbox: Inbox, events: LinkEvents, law:
     """Load, or compile, the functions of a tick before the flight."""
     k = len(autopilots.own)
     nobody, state, controls = np.zeros(k, np.int64), np.zeros((k, 13)), np.zeros((k, 4))
-    sense_and_refer(autopilots, nobody, state, controls, 0, 1)
+    sense_all(autopilots, nobody, state, controls, 0)
     law.hear_and_control(autopilots, inbox, nobody, controls, nobody, 0, 1)
     set_links(events, inbox, -1)
     admit(inbox, 0, 0, -1, 0, True, autopilots.shared[0], 0, 0, 0)
@@ -224,7 +224,7 @@ class Crew:
 
     def tick(self, tick: int, active: np.ndarray) -> None:
         """One tick of the ``active`` autopilots."""
-        self.sense_and_refer(tick, active)
+        self.sense(tick, active)
         self.hear(tick, active)
         self.control(tick, active)
         self.actuate(tick, active)
@@ -232,9 +232,9 @@ class Crew:
             self.tell(tick, active)
         self.report(tick, active)
 
-    def sense_and_refer(self, tick: int, active: np.ndarray) -> None:
-        """Own state from the vehicle's message; the leaders' profiles."""
-        sense_and_refer(self.autopilots, active, self.messages, self.reported, self.now_us(tick), self.timing.period_us)
+    def sense(self, tick: int, active: np.ndarray) -> None:
+        """Own state from the vehicle's message."""
+        sense_all(self.autopilots, active, self.messages, self.reported, self.now_us(tick))
 
     def hear(self, tick: int, active: np.ndarray) -> None:
         """Link events, then the records that are due, through the channel into the inbox."""
