@@ -16,6 +16,7 @@ from types import ModuleType
 import numpy as np
 
 from ftcc.airside.autopilots import Autopilots, LinkEvents, build, link_events, sense_all, set_links, tick_of
+from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.airside.telemetry import Reporter
@@ -30,19 +31,14 @@ from ftcc.link.mavlink import (
     read_state,
     target_message,
 )
-from ftcc.link.mesh import Mesh
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
-from ftcc.link.record import Record, RecordError
+from ftcc.link.record import Record
 from ftcc.link.recording import Column, PartWriter
 
 __all__ = ["Crew", "columns", "load_compiled", "run"]
 
-_AHEAD = 4
-"""Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
 _POLL = 0.001
 """Wall time between two looks at the mesh while a record or a greeting is awaited, s."""
-_NOTHING_MORE = 2**31 - 1
-"""Sequence number acknowledged by a UAV that hears nobody, or has ended."""
 
 
 def columns(scheme: str) -> tuple[Column, ...]:
@@ -78,17 +74,6 @@ def _those(mask: np.ndarray) -> list[int]:
     return np.flatnonzero(mask).tolist()  # type: ignore[no-any-return]
 
 
-class _Link:
-    """An in-edge as its receiver manages it: raw records that are not due yet, and what is known of the sender."""
-
-    def __init__(self) -> None:
-        self.pending: collections.deque[Record] = collections.deque()
-        self.newest = -1
-        """Sequence number of the newest record received."""
-        self.ended = False
-        """The sender has ended: nothing more will come."""
-
-
 class Crew:
     """The autopilots of a process."""
 
@@ -97,7 +82,6 @@ class Crew:
         self.setting = setting
         self.timing = setting.timing
         self.gate = gate
-        self.index = {spec.uav: i for i, spec in enumerate(specs)}
         self.autopilots, self.inbox = build(specs, self.timing)
         self.events = link_events(specs)
         self.law = tick_of(specs[0].scheme)
@@ -114,13 +98,6 @@ class Crew:
         """Last tick of each autopilot."""
         self.ending: set[int] = set()
         """Whose aircraft is lost."""
-        self.links = [{n.uav: _Link() for n in spec.neighbours} for spec in specs]
-        self.edge = [{n.uav: e for e, n in enumerate(spec.neighbours)} for spec in specs]
-        self.acknowledged: dict[int, int] = {}
-        """Lockstep: what each hearer outside this process has acknowledged."""
-        self.complete = -1
-        """Lockstep: all records up to this sequence number are here."""
-        self.bad_records = 0
         ports = [setting.ports[spec.uav] for spec in specs]
         self.vehicles = [
             Endpoint(spec.uav, AUTOPILOT, port.autopilot, (LOOPBACK, port.vehicle))
@@ -132,7 +109,7 @@ class Crew:
             for i, spec in enumerate(specs)
             if spec.role == "follower"
         }
-        self.mesh = self._open_mesh()
+        self.neighbourhood = Neighbourhood(specs, setting, gate)
         self.telemetry = [Telemetry(self.timing) for _ in specs]
         self.stall = Stall()
         self.waiter = Waiter()
@@ -141,35 +118,15 @@ class Crew:
             self.waiter.add(vehicle, functools.partial(self.listen, i))
         load_compiled(self.autopilots, self.inbox, self.events, self.law)
 
-    def _open_mesh(self) -> Mesh | None:
-        """The process's peer, or None if all its neighbours are in this very process."""
-        own = set(self.index)
-        hears = {n.uav for spec in self.specs for n in spec.neighbours} - own
-        hearers = {(spec.uav, uav) for spec in self.specs for uav in spec.hearers if uav not in own}
-        if not hears and not hearers:
-            return None
-        linked = hears | {uav for _, uav in hearers}
-        if self.setting.lockstep:
-            # Acknowledgements travel with the hearers' own records, so an edge is subscribed to at both ends.
-            senders = {(spec.uav, n.uav) for spec in self.specs for n in spec.neighbours if n.uav not in own}
-            self.acknowledged = {uav: -1 for _, uav in hearers}
-            hears, hearers = linked, hearers | senders
-        # A peer listens on the port of its process's first UAV; of two peers the later one connects.
-        me = self.specs[0].uav
-        peers = {self.setting.peer_of[uav] for uav in linked}
-        connect = [self.setting.ports[peer].mesh for peer in sorted(peers) if peer < me]
-        listen = self.setting.ports[me].mesh if any(peer > me for peer in peers) else None
-        return Mesh(self.setting.swarm, own, hears, hearers, listen, connect, self.setting.lockstep)
-
     def meet(self) -> None:
         """Wait until all who hear this process's UAVs have subscribed."""
         self.stall.progress()
-        while self.mesh and not self.mesh.ready:
+        while not self.neighbourhood.ready:
             if self.gate.stopping:
                 return
             self.waiter.wait(_POLL)
             if self.stall.long:
-                self.gate.tell(Said("warning", f"mesh: still waiting for {', '.join(self.mesh.awaited)}"))
+                self.gate.tell(Said("warning", f"mesh: still waiting for {self.neighbourhood.awaited}"))
 
     def fly(self) -> None:
         """All ticks, or until everybody is lost or the launcher stops the flight."""
@@ -200,7 +157,7 @@ class Crew:
         one = np.zeros_like(self.alive)
         while self.alive.any() and not self.gate.stopping:
             self.waiter.wait(0.2)
-            self.take_records()
+            self.neighbourhood.take()
             for i in range(len(self.specs)):
                 while self.alive[i] and self.states[i]:
                     tick = self.take_state(i)
@@ -243,24 +200,21 @@ class Crew:
         if events.position[0] < len(events.at_us) and events.at_us[events.position[0]] <= now:
             set_links(events, self.inbox, now)
         for i in _those(active):
-            for sender, link in self.links[i].items():
-                while link.pending and link.pending[0].stamp_us + self.timing.latency_us <= now:
-                    record = link.pending.popleft()
-                    radio_on = record.radio_on and bool(events.radio_on[i])
-                    values = np.zeros(self.inbox.values.shape[2])
-                    values[: len(record.values)] = record.values
-                    admit(
-                        self.inbox,
-                        i,
-                        self.edge[i][sender],
-                        record.sequence,
-                        record.stamp_us,
-                        radio_on,
-                        values,
-                        self.timing.latency_us,
-                        now,
-                        self.timing.seed,
-                    )
+            for edge, record in self.neighbourhood.due(i, now):
+                values = np.zeros(self.inbox.values.shape[2])
+                values[: len(record.values)] = record.values
+                admit(
+                    self.inbox,
+                    i,
+                    edge,
+                    record.sequence,
+                    record.stamp_us,
+                    record.radio_on and bool(events.radio_on[i]),
+                    values,
+                    self.timing.latency_us,
+                    now,
+                    self.timing.seed,
+                )
 
     def control(self, tick: int, active: np.ndarray) -> None:
         """The law."""
@@ -290,7 +244,7 @@ class Crew:
 
     def tell(self, tick: int, active: np.ndarray) -> None:
         """A record for the neighbours: here those in this process, by the mesh the others."""
-        heard = self.heard()
+        heard = self.neighbourhood.heard(_those(self.alive))
         for i in _those(active):
             if self.alive[i]:
                 record = Record(
@@ -301,7 +255,7 @@ class Crew:
                     bool(self.events.radio_on[i]),
                     heard=heard,
                 )
-                self.publish(record)
+                self.neighbourhood.publish(record)
 
     def report(self, tick: int, active: np.ndarray) -> None:
         """A row of the recording, and telemetry to the ground."""
@@ -323,39 +277,6 @@ class Crew:
     def now_us(self, tick: int) -> int:
         """Simulated time of a tick."""
         return tick * self.timing.period_us
-
-    def publish(self, record: Record) -> None:
-        """Give a record to all who hear its sender."""
-        for links in self.links:
-            if record.uav in links:
-                self._keep(links[record.uav], record)
-        if self.mesh:
-            self.mesh.publish(record.uav, record.pack())
-
-    def _keep(self, link: _Link, record: Record) -> None:
-        if record.last:
-            link.ended = True
-        elif record.sequence > link.newest:
-            link.newest = record.sequence
-            link.pending.append(record)
-
-    def take_records(self) -> None:
-        """Sort what the mesh has brought."""
-        if self.mesh is None:
-            return
-        for payload in self.mesh.receive():
-            try:
-                record = Record.unpack(payload)
-            except RecordError as error:
-                self.bad_records += 1
-                if self.bad_records == 1:
-                    self.gate.tell(Said("warning", f"mesh: {error}"))
-                continue
-            for links in self.links:
-                if record.uav in links:
-                    self._keep(links[record.uav], record)
-            if record.uav in self.acknowledged:
-                self.acknowledged[record.uav] = _NOTHING_MORE if record.last else record.heard
 
     def listen(self, i: int) -> None:
         """Take in what vehicle ``i`` sent; a state that was answered already is answered once more."""
@@ -381,7 +302,7 @@ class Crew:
         self.stall.progress()
         sent = time.monotonic()
         while not self.gate.stopping:
-            missing = self.missing_state() or self.missing_records(tick)
+            missing = self.missing_state() or self.neighbourhood.missing(tick, _those(self.alive))
             if not missing:
                 return True
             # States wake this process up; the mesh is polled, and only by who needs a record.
@@ -409,43 +330,6 @@ class Crew:
                 return f"the state of UAV {self.specs[i].uav}"
         return ""
 
-    def missing_records(self, tick: int) -> str:
-        """What a tick still needs of the mesh, as text; empty if nothing."""
-        if self.mesh is None:
-            return ""
-        due = self.now_us(tick) - self.timing.latency_us
-        needed = due // self.timing.exchange_us if due >= 0 else -1
-        tells = tick % self.timing.exchange_every == 0
-        if needed == self.complete and not tells:
-            return ""
-        self.take_records()
-        for i in _those(self.alive):
-            for sender, link in self.links[i].items():
-                if sender not in self.index and link.newest < needed and not self.over(sender, link):
-                    return f"record {needed} of UAV {sender}"
-        self.complete = needed
-        if tells:
-            window = _AHEAD - (-self.timing.latency_us // self.timing.exchange_us)
-            awaited = tick // self.timing.exchange_every - window
-            for hearer, heard in self.acknowledged.items():
-                if heard < awaited and hearer not in self.gate.gone:
-                    return f"UAV {hearer} to acknowledge record {awaited}"
-        return ""
-
-    def over(self, sender: int, link: _Link) -> bool:
-        """Whether nothing more will come from a sender."""
-        return link.ended or sender in self.gate.gone
-
-    def heard(self) -> int:
-        """Sequence number up to which everything has been received from all outside this process."""
-        newest = [
-            link.newest
-            for i in _those(self.alive)
-            for sender, link in self.links[i].items()
-            if sender not in self.index and not self.over(sender, link)
-        ]
-        return min(newest, default=_NOTHING_MORE)
-
     def end_the_lost(self) -> None:
         """UAVs whose aircraft is lost end once the states before that are worked off."""
         for i in list(self.ending):
@@ -472,7 +356,8 @@ class Crew:
         if self.alive[i]:
             self.alive[i] = 0
             tick = int(self.done[i])
-            self.publish(Record(self.specs[i].uav, max(tick, 0), self.now_us(max(tick, 0)), (), last=True))
+            last = Record(self.specs[i].uav, max(tick, 0), self.now_us(max(tick, 0)), (), last=True)
+            self.neighbourhood.publish(last)
 
     def close(self) -> None:
         """Free the ports; leave the mesh."""
@@ -480,6 +365,5 @@ class Crew:
             vehicle.close()
         for reporter in self.reporters:
             reporter.close()
-        if self.mesh:
-            self.mesh.close()
+        self.neighbourhood.close()
         self.waiter.close()
