@@ -280,7 +280,7 @@ class Crew:
 
     def listen(self, i: int) -> None:
         """Take in what vehicle ``i`` sent; a state that was answered already is answered once more."""
-        messages = self.vehicles[i].receive()
+        messages = self.vehicles[i].receive(self.setting.datagrams)
         while messages:
             if messages[0].get_type() == "HEARTBEAT":
                 if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:

@@ -130,10 +130,10 @@ class Endpoint:
         except BlockingIOError:
             return  # The buffer is full: lost, as a datagram may be.
 
-    def receive(self) -> list[Any]:
-        """All messages that have arrived, in order; bad data and non-finite values are dropped and counted."""
+    def receive(self, datagrams: int = _DATAGRAMS_PER_READ) -> list[Any]:
+        """The messages of the next ``datagrams``, in order; bad data and non-finite values are dropped and counted."""
         messages: list[Any] = []
-        for _ in range(_DATAGRAMS_PER_READ):
+        for _ in range(datagrams):
             try:
                 datagram = self._socket.recv(_LARGEST_DATAGRAM)
             except BlockingIOError:
@@ -163,28 +163,29 @@ class Endpoint:
 _MAY_HOLD_NAN = ("COMMAND_LONG", "COMMAND_INT", "PARAM_SET", "PARAM_VALUE")
 """Here nan means "not given", or is the bit pattern of an integer: the readers check what they use."""
 
-_read_floats: dict[int, Callable[[Any], Any]] = {}
+_sum_floats: dict[int, Callable[[Any], float]] = {}
 
 
-def _floats_of(message: Any) -> Callable[[Any], Any]:
-    """A function that gets the float fields of such a message as one value or a tuple of values."""
+def _adder(message: Any) -> Callable[[Any], float]:
+    """A function that adds up all floats of such a message: the sum is finite only if every term is."""
     kinds = zip(message.fieldnames, message.fieldtypes, strict=True)
     names = [name for name, kind in kinds if kind in ("float", "double")]
-    if not names or message.get_type() in _MAY_HOLD_NAN:
-        return lambda _: 0.0
-    return operator.attrgetter(*names)
+    if message.get_type() in _MAY_HOLD_NAN:
+        names = []
+    arrays = [name for name in names if not isinstance(getattr(message, name), float | int)]
+    scalars = [name for name in names if name not in arrays]
+    # An attrgetter of one name gives the value itself: the second name makes it a tuple.
+    read_scalars = operator.attrgetter(*(scalars * 2)) if scalars else lambda _: ()
+    read_arrays = operator.attrgetter(*(arrays * 2)) if arrays else lambda _: ()
+    return lambda one: sum(read_scalars(one)) + sum(map(sum, read_arrays(one)))
 
 
 def _finite(message: Any) -> bool:
     kind = message.get_msgId()
-    if kind not in _read_floats:
-        _read_floats[kind] = _floats_of(message)
-    values = _read_floats[kind](message)
-    # A sum is finite only if every term is.
-    try:
-        return math.isfinite(values if isinstance(values, float | int) else sum(values))
-    except TypeError:  # several fields of which some are arrays
-        return all(math.isfinite(value if isinstance(value, float | int) else sum(value)) for value in values)
+    add = _sum_floats.get(kind)
+    if add is None:
+        add = _sum_floats[kind] = _adder(message)
+    return math.isfinite(add(message))
 
 
 def state_messages(stamp_us: int, state: NDArray[np.float64], controls: NDArray[np.float64] | None) -> tuple[Any, ...]:

@@ -48,6 +48,11 @@ class Setting:
     folder: Path
     """The run's folder."""
 
+    @property
+    def datagrams(self) -> int:
+        """Datagrams to read at a time: one where one is awaited, all where the newest counts."""
+        return 1 if self.lockstep else 64
+
 
 class Waiter:
     """Waits for any of several sockets and pipes, and has what arrives handled."""

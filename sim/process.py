@@ -180,7 +180,7 @@ class Vehicles:
     def listen(self, i: int) -> None:
         """Take in what the autopilot of vehicle ``i`` sent; the newest command counts."""
         pilot = self.pilots[i]
-        for message in pilot.receive():
+        for message in pilot.receive(self.setting.datagrams):
             kind = message.get_type()
             if kind == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
                 self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
