@@ -198,7 +198,7 @@ def resume(name: _Name = None) -> None:
     _tell(name, "resume")
 
 
-_MS_PER_TICK = 0.55
+_MS_PER_TICK = 0.95
 """Processor time that one UAV (vehicle and autopilot process) costs per tick, ms; measured on a 2-core AMD EPYC."""
 
 

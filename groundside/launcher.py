@@ -34,6 +34,8 @@ _START = 0.05
 """Wall time between go and the first tick, s."""
 _END = 1.2
 """Wall time that processes have to end by themselves, s."""
+_ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
+"""Exit codes after a stop that are nobody's death: also SIGTERM to the whole group, and a fork server gone first."""
 _LAST_WORDS = 12
 """Lines of a dead process's log that are reported."""
 _SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
@@ -250,7 +252,7 @@ class Swarm:
         child.process.join()
         if child.ended:
             return
-        if self.stopping_since is None or child.process.exitcode not in (0, 3, -9):
+        if self.stopping_since is None or child.process.exitcode not in _ENDED_ON_REQUEST:
             self.outcome.died.append(child.name)
             code = child.process.exitcode
             how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
