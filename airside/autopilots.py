@@ -179,11 +179,12 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
 
 def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
     """The link events of ``specs`` in one table, in order of time."""
-    rows = sorted(
+    rows = [
         (event.at_us, i, -1 if event.sender is None else [n.uav for n in spec.neighbours].index(event.sender), event)
         for i, spec in enumerate(specs)
         for event in spec.link_events
-    )
+    ]
+    rows.sort(key=lambda row: row[:3])
     return LinkEvents(
         at_us=np.array([row[0] for row in rows], np.int64),
         uav=np.array([row[1] for row in rows], np.int64),

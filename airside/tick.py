@@ -6,7 +6,6 @@ in. The functions work on the arrays of `Autopilots`, in the autopilot process a
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from ftcc.airside.autopilots import lead
@@ -32,6 +31,9 @@ _step = scheme.step
 _share = scheme.share
 _observe = scheme.observe
 _COMMANDS = len(scheme.COMMANDS)
+
+_LARGEST = 1e30
+"""Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
 
 
 @compiled
@@ -74,7 +76,7 @@ def control(autopilots, inbox, i, dt):
     before = fields(_State, autopilots.state[i])
     after, output = _step(before, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
     for n in range(_COMMANDS):
-        if not math.isfinite(output[n]):
+        if not abs(output[n]) < _LARGEST:
             return False
     store(after, autopilots.state[i])
     store(output, autopilots.output[i])

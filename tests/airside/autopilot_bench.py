@@ -28,11 +28,11 @@ def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarr
 class Bench:
     """The crew, its sockets and its gate; as a context it flies in a thread."""
 
-    def __init__(self, folder: Path, ticks: int) -> None:
+    def __init__(self, folder: Path, ticks: int, lockstep: bool = True) -> None:
         self.block = reserve((1,))
         ports = self.block.of(1)
         self.timing = timing("flight", ticks / 100)
-        setting = Setting("test", self.timing, True, {1: ports}, {1: 1}, self.block.station, folder)
+        setting = Setting("test", self.timing, lockstep, {1: ports}, {1: 1}, self.block.station, folder)
         self.launcher, pipe = Pipe()
         self.vehicle = Endpoint(1, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
         self.station = Endpoint(STATION, 1, self.block.station)
