@@ -72,7 +72,7 @@ class Flight:
 
     def wait_until_flying(self) -> None:
         """Wait until every process has recorded something."""
-        self.wait_until(lambda: all(part.stat().st_size > 20_000 for part in self._parts()) and len(self._parts()) > 8)
+        self.wait_until(lambda: all(part.stat().st_size > 8_000 for part in self._parts()) and len(self._parts()) > 8)
 
     def _parts(self) -> list[Path]:
         return list((self.folder / "parts").glob("*.arrows"))
