@@ -27,7 +27,8 @@ from ftcc.link.mavlink import (
     LOOPBACK,
     Endpoint,
     command_message,
-    dialect,
+    ending_message,
+    ends,
     read_state,
     target_message,
 )
@@ -282,11 +283,8 @@ class Crew:
         """Take in what vehicle ``i`` sent; a state that was answered already is answered once more."""
         messages = self.vehicles[i].receive(self.setting.datagrams)
         while messages:
-            if messages[0].get_type() == "HEARTBEAT":
-                if messages[0].system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
-                    self.ending.add(i)
-                messages = messages[1:]
-                continue
+            if ends(messages[0]):
+                self.ending.add(i)
             state, controls = np.zeros(13), np.zeros(4)
             stamp, used = read_state(messages, state, controls)
             messages = messages[used:]
@@ -339,16 +337,7 @@ class Crew:
 
     def give_up(self, i: int) -> None:
         """The law's command is not finite: tell the vehicle, and end."""
-        self.vehicles[i].send(
-            dialect.MAVLink_heartbeat_message(
-                dialect.MAV_TYPE_FIXED_WING,
-                dialect.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                dialect.MAV_STATE_FLIGHT_TERMINATION,
-                3,
-            )
-        )
+        self.vehicles[i].send(ending_message())
         self.end(i)
 
     def end(self, i: int) -> None:

@@ -23,6 +23,8 @@ __all__ = [
     "Endpoint",
     "command_message",
     "dialect",
+    "ending_message",
+    "ends",
     "float_array",
     "read_command",
     "read_state",
@@ -270,6 +272,23 @@ def read_target(message: Any, target: NDArray[np.float64]) -> int:
     m = message
     target[:] = (m.time_boot_ms / 1e3, m.x, m.y, -m.z, m.vx, m.vy, -m.vz)
     return int(m.time_boot_ms) * 1000
+
+
+def ending_message() -> Any:
+    """HEARTBEAT by which vehicle and autopilot tell each other that their UAV ends here."""
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_FIXED_WING,
+        dialect.MAV_AUTOPILOT_INVALID,
+        0,
+        0,
+        dialect.MAV_STATE_FLIGHT_TERMINATION,
+        3,
+    )
+
+
+def ends(message: Any) -> bool:
+    """Whether this is an `ending_message`."""
+    return bool(message.get_type() == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION)
 
 
 def float_array(stamp_us: int, name: str, values: Sequence[float]) -> Any:

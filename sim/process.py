@@ -19,7 +19,8 @@ from ftcc.link.mavlink import (
     LOOPBACK,
     SIMULATOR,
     Endpoint,
-    dialect,
+    ending_message,
+    ends,
     float_array,
     read_command,
     read_target,
@@ -181,8 +182,7 @@ class Vehicles:
         """Take in what the autopilot of vehicle ``i`` sent; the newest command counts."""
         pilot = self.pilots[i]
         for message in pilot.receive(self.setting.datagrams):
-            kind = message.get_type()
-            if kind == "HEARTBEAT" and message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION:
+            if ends(message):
                 self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
                 continue
             if self.specs[i].kind == "reference_point":
@@ -252,16 +252,7 @@ class Vehicles:
             return
         self.alive[i] = 0
         self.parts[i].flush()
-        self.pilots[i].send(
-            dialect.MAVLink_heartbeat_message(
-                dialect.MAV_TYPE_FIXED_WING,
-                dialect.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                dialect.MAV_STATE_FLIGHT_TERMINATION,
-                3,
-            )
-        )
+        self.pilots[i].send(ending_message())
         self.gate.tell(Lost(self.specs[i].uav, at_us, LOST[why]))
 
     def report(self) -> None:
