@@ -1,4 +1,4 @@
-"""What people touch. `Run` opens a recorded flight; `load`, `resolve` and `simulate` fly one from a program."""
+"""What people touch. `Run` opens a recorded flight; `load` and `resolve` prepare one for `simulate.simulate`."""
 
 from __future__ import annotations
 
