@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ftcc.airside.references.profiles import Profile, largest_acceleration, largest_climb
-from ftcc.airside.scheme import Flight, Reference, Scheme
+from ftcc.airside.scheme import Flight, Problem, Reference, Scheme
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan
@@ -194,6 +196,14 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
     return graph
 
 
+def _require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Findings) -> None:
+    for uav in uavs:
+        if uav not in plan.uavs.followers:
+            findings.refuse(
+                f"{where}: UAV {uav} is no follower; followers are {', '.join(map(str, plan.uavs.followers))}"
+            )
+
+
 def limits_of(plan: Plan, actuators: tuple[str, ...], findings: Findings) -> tuple[tuple[float, float], ...]:
     """Travel in the order of ``ACTUATORS``; (0, 0) for what the plant lacks, which nothing else may speak of either."""
     limits = []
@@ -216,15 +226,9 @@ def limits_of(plan: Plan, actuators: tuple[str, ...], findings: Findings) -> tup
                 f"faults.{n}.uav = {fault.uav}: is no follower; "
                 f"followers are {', '.join(map(str, plan.uavs.followers))}"
             )
-    for where, uavs in (
-        *((f"disturbances.{n}.uavs", d.uavs or []) for n, d in enumerate(plan.disturbances)),
-        ("start.uav", list(plan.start.uav)),
-    ):
-        for uav in uavs:
-            if uav not in plan.uavs.followers:
-                findings.refuse(
-                    f"{where}: UAV {uav} is no follower; followers are {', '.join(map(str, plan.uavs.followers))}"
-                )
+    for n, disturbance in enumerate(plan.disturbances):
+        _require_followers(f"disturbances.{n}.uavs", disturbance.uavs or (), plan, findings)
+    _require_followers("start.uav", plan.start.uav, plan, findings)
     if isinstance(plan.plant.initial_actuators, dict):
         for name in plan.plant.initial_actuators:
             if name not in actuators:
@@ -241,35 +245,48 @@ def level_trim(airframe: Airframe, V: float, where: str, findings: Findings, **d
         return Trim(math.nan, math.nan, math.nan)
 
 
-def gains_of(scenario: Scenario, scheme: Scheme, findings: Findings) -> Any:
-    """The scheme's ``Gains``: of the form, of the scenario, and what switches that are off change; None if refused."""
+def gains_of(scenario: Scenario, scheme: Scheme, findings: Findings) -> dict[int, Any]:
+    """Each UAV's ``Gains``: of the form, of the scenario, its own, and what switches that are off change.
+
+    Empty if they are refused.
+    """
     plan = scenario.plan
-    overrides = dict(plan.gains)
+    switched: dict[str, float] = {}
     for name, on in plan.switches.items():
         if name not in scheme.switches:
             findings.refuse(
                 f"switches.{name}: scheme {scheme.name} has no such switch; it has {', '.join(scheme.switches)}"
             )
         elif not on:
-            overrides |= scheme.switches[name]
-    try:
-        return scheme.gains(scenario.form, overrides)
-    except ValueError as error:
-        findings.refuse(f"gains: {error}")
-        return None
+            switched |= scheme.switches[name]
+
+    def complete(where: str, overrides: Mapping[str, float]) -> Any:
+        try:
+            return scheme.gains(scenario.form, {**overrides, **switched})
+        except ValueError as error:
+            findings.refuse(f"{where}: {error}")
+            return None
+
+    _require_followers("gains.uav", plan.gains.uav, plan, findings)
+    common = plan.gains.common
+    shared = complete("gains", common)
+    if shared is None:
+        return {}
+    own = {uav: complete(f"gains.uav.{uav}", common | gains) for uav, gains in plan.gains.uav.items()}
+    return {} if None in own.values() else dict.fromkeys((*plan.uavs.followers, *plan.uavs.leaders), shared) | own
 
 
 def check_scheme(
     plan: Plan,
     scheme: Scheme,
-    gains: Any,
+    gains: Mapping[int, Any],
     graph: Graph,
     timing: Timing,
     vehicles: list[VehicleSpec],
     profiles: dict[int, Profile],
     findings: Findings,
 ) -> None:
-    """The scheme's own conditions on gains and mission."""
+    """The scheme's own conditions on gains and mission; each follower's gains must meet them."""
     speeds = {p.V for p in profiles.values()}
     speeds |= {command.speed for p in profiles.values() for command in p.commands}
     speeds |= {trigger.speed for p in profiles.values() for trigger in p.triggers}
@@ -295,11 +312,21 @@ def check_scheme(
             if vehicle.uav in graph.followers
         },
     )
-    for problem in scheme.check(gains, flight):
+    alike: dict[Any, list[int]] = {}
+    for uav in graph.followers:
+        alike.setdefault(gains[uav], []).append(uav)
+    found: dict[Problem, list[int]] = {}
+    for chosen, uavs in alike.items():
+        # A condition on initial errors concerns those who fly with these gains.
+        concerned = replace(flight, initial={uav: flight.initial[uav] for uav in uavs})
+        for problem in scheme.check(chosen, concerned):
+            found.setdefault(problem, []).extend(uavs)
+    for problem, uavs in found.items():
+        who = "" if len(uavs) == len(graph.followers) else f"UAV {', '.join(map(str, sorted(uavs)))}: "
         if problem.fatal:
-            findings.refuse(problem.text)
+            findings.refuse(who + problem.text)
         else:
-            findings.warned.append(problem.text)
+            findings.warned.append(who + problem.text)
 
 
 def check_faults(plan: Plan, vehicles: list[VehicleSpec], findings: Findings) -> None:

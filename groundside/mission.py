@@ -107,7 +107,7 @@ def resolve(scenario: Scenario) -> Mission:
     check_faults(plan, vehicles, findings)
 
     gains = gains_of(scenario, scheme, findings)
-    if gains is not None:
+    if gains:
         check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, graph, channel, findings.refuse)
@@ -115,7 +115,6 @@ def resolve(scenario: Scenario) -> Mission:
     names = (*LEADING, *(quantity.name for quantity in scheme.signals))
     findings.refused += check_claims(plan.claims, graph, names)
     findings.stop_if_refused()
-    assert gains is not None
 
     low, high = zip(*limits, strict=True)
     model = Model(
@@ -131,7 +130,7 @@ def resolve(scenario: Scenario) -> Mission:
             uav=vehicle.uav,
             role="leader" if vehicle.uav in graph.leaders else "follower",
             scheme=scheme.name,
-            gains=tuple(gains),
+            gains=tuple(gains[vehicle.uav]),
             model=model,
             travel=vehicle.travel,
             mission=Reference(x=0.0, V=plan.mission.V, V_dot=0.0, z=0.0, z_dot=0.0, z_ddot=0.0, x_dot=plan.mission.V),

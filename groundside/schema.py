@@ -227,6 +227,20 @@ class Starts(Start):
     uav: dict[Id, Start] = {}
 
 
+class GainFields(BaseModel):
+    """Gains of the scheme by name, and where single UAVs differ."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, float]
+
+    uav: dict[Id, dict[str, float]] = {}
+
+    @property
+    def common(self) -> dict[str, float]:
+        """Those of all UAVs, as far as the file gives them."""
+        return dict(self.__pydantic_extra__)
+
+
 class MissionFields(Strict):
     """What every follower knows without being told."""
 
@@ -377,7 +391,7 @@ class Plan(Strict):
     start: Starts
     mission: MissionFields
     leaders: dict[Id, LeaderFields] = {}
-    gains: dict[str, float] = {}
+    gains: GainFields = GainFields()
     switches: dict[str, bool] = {}
     disturbances: list[DisturbanceFields] = []
     faults: list[FaultFields] = []

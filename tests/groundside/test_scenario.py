@@ -28,12 +28,12 @@ def refused(name: str | Path, *fragments: str, **options: Any) -> None:
 
 def test_settings_come_after_variants_and_variants_after_the_form() -> None:
     plan = load("containment", variants=["P"]).plan
-    assert plan.gains["k11"] == 7.3
-    assert plan.gains["shaper"] == 2.0
+    assert plan.gains.common["k11"] == 7.3
+    assert plan.gains.common["shaper"] == 2.0
     assert plan.rates.control_rate == 200.0
     assert plan.rates.exchange_rate == 20.0
     plan = load("containment", variants=["P"], settings=["gains.k11=5", "faults.1.at=240.5", "scheme=other"]).plan
-    assert (plan.gains["k11"], plan.faults[1].at, plan.scheme) == (5.0, 240.5, "other")
+    assert (plan.gains.common["k11"], plan.faults[1].at, plan.scheme) == (5.0, 240.5, "other")
 
 
 def test_variants_apply_in_the_order_of_the_file_and_name_the_case_so() -> None:
@@ -47,8 +47,12 @@ def test_a_variant_may_change_one_form_only(edited: Edited) -> None:
         document["variant"] = {"strong": {"gains": {"k11": 4.0}, "monograph": {"gains": {"k12": 5.0}}}}
 
     path = edited(change)
-    assert load(path, form="flight", variants=["strong"]).plan.gains == {"in_flight": 1.0, "k11": 4.0}
-    assert load(path, form="monograph", variants=["strong"]).plan.gains == {"in_flight": 1.0, "k11": 4.0, "k12": 5.0}
+    assert load(path, form="flight", variants=["strong"]).plan.gains.common == {"in_flight": 1.0, "k11": 4.0}
+    assert load(path, form="monograph", variants=["strong"]).plan.gains.common == {
+        "in_flight": 1.0,
+        "k11": 4.0,
+        "k12": 5.0,
+    }
 
 
 def test_a_flown_scenario_flies_again_as_it_was_flown(tmp_path: Path) -> None:
@@ -86,6 +90,25 @@ def test_actuators_start_at_the_trim() -> None:
     first = resolve(load("containment")).vehicles[0]
     assert first.command == pytest.approx((0.0, -0.19688, 0.0, 21.303), abs=1e-3)
     assert first.lag[1] == 20.0
+
+
+def test_each_uav_flies_with_the_common_gains_but_for_its_own() -> None:
+    settings = ["gains.uav.3={k11=3.5, k12=4.0}", "gains.uav.5.k11=6.0"]
+    plain, own = resolve(load("containment")), resolve(load("containment", settings=settings))
+    names = own.scheme.gains_type._fields
+    changed = {
+        spec.uav: {
+            name: after for name, before, after in zip(names, common.gains, spec.gains, strict=True) if before != after
+        }
+        for common, spec in zip(plain.autopilots, own.autopilots, strict=True)
+    }
+    assert {uav: gains for uav, gains in changed.items() if gains} == {3: {"k11": 3.5, "k12": 4.0}, 5: {"k11": 6.0}}
+
+
+def test_a_switch_that_is_off_is_off_for_every_uav() -> None:
+    mission = resolve(load("containment", settings=["gains.uav.3.observers=1", "switches.fault_tolerance=false"]))
+    observers = mission.scheme.gains_type._fields.index("observers")
+    assert {spec.gains[observers] for spec in mission.autopilots} == {0.0}
 
 
 def test_a_cut_radio_and_a_cut_edge_become_changes_at_the_right_receivers() -> None:
@@ -162,6 +185,13 @@ def test_malformed_toml_is_reported_with_its_line(tmp_path: Path) -> None:
         ({"settings": ["gains.k11=inf"]}, ["gains.k11 = inf", "finite"]),
         ({"settings": ["gains.k11=0"]}, ["gain k11 = 0", "must be > 0"]),
         ({"settings": ["gains.beta2=1.5"]}, ["gain beta2 = 1.5", "climb rate"]),
+        ({"settings": ["gains.k11='high'"]}, ["gains.k11 = 'high'", "valid number"]),
+        ({"settings": ["gains.uav.3.k99=1"]}, ["gains.uav.3: ", "no gain 'k99'", "k11"]),
+        ({"settings": ["gains.uav.3.k11=nan"]}, ["gains.uav.3.k11 = nan", "finite"]),
+        ({"settings": ["gains.uav.9.k11=1.0"]}, ["gains.uav: UAV 9 is no follower", "1, 2, 3"]),
+        ({"settings": ["gains.uav.7.k11=1.0"]}, ["gains.uav: UAV 7 is no follower"]),
+        ({"settings": ["gains.uav.3.k11=0"]}, ["UAV 3: gain k11 = 0", "must be > 0"]),
+        ({"settings": ["gains.uav.x.k11=1"]}, ["gains.uav.x", "valid integer"]),
         ({"settings": ["switches.magic=false"]}, ["switches.magic", "fault_tolerance"]),
         ({"settings": ["faults.0.actuator='rudder'"]}, ["faults.0.actuator = 'rudder'", "thrust, elevator"]),
         ({"settings": ["faults.0.actuator='flap'"]}, ["faults.0.actuator = 'flap'", "'thrust', 'elevator'"]),
