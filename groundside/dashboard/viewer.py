@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from ftcc.groundside.viewer_page import PageServer
+from ftcc.groundside.dashboard.viewer_page import PageServer
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -13,16 +13,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ftcc.airside.scheme import Quantity
+from ftcc.groundside.dashboard.viewer import BLUEPRINT, Entry, Kind, Viewer, write
 from ftcc.groundside.snapshot import Event, Snapshot
-from ftcc.groundside.viewer import BLUEPRINT, Entry, Kind, Viewer, write
 from ftcc.link.graph import Graph
 
 if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
-    from ftcc.groundside.plots import Plots
-    from ftcc.groundside.scene import Scene
+    from ftcc.groundside.dashboard.plots import Plots
+    from ftcc.groundside.dashboard.scene import Scene
 
 __all__ = ["Dashboard"]
 
@@ -145,8 +145,8 @@ class Dashboard:
 
     def _begin(self, snapshot: Snapshot) -> list[Entry]:
         """What is logged once; the first snapshot tells how large the swarm is."""
-        from ftcc.groundside.plots import Plots
-        from ftcc.groundside.scene import Scene
+        from ftcc.groundside.dashboard.plots import Plots
+        from ftcc.groundside.dashboard.scene import Scene
 
         self._scene = Scene(self._graph, self._leaders, self._stale_after, snapshot)
         self._plots = Plots(self._signals, self._limits, self._leaders, self._followers)
@@ -155,7 +155,7 @@ class Dashboard:
 
     def _own_events(self) -> list[Entry]:
         """The dashboard's own trouble, for its event log."""
-        from ftcc.groundside.plots import events
+        from ftcc.groundside.dashboard.plots import events
 
         problem = self._viewer.take_problem() if self._viewer is not None else None
         if problem is None:

@@ -11,9 +11,9 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.airside.scheme import Quantity
-from ftcc.groundside.scene import GRAY, Color, colors, faults, name
+from ftcc.groundside.dashboard.scene import GRAY, Color, colors, faults, name
+from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.snapshot import Event, Snapshot
-from ftcc.groundside.viewer import Entry
 
 __all__ = ["Plots", "tracking_errors"]
 

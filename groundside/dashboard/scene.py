@@ -14,8 +14,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.snapshot import LinkState, Snapshot, UavState
-from ftcc.groundside.viewer import Entry
 from ftcc.link.graph import Graph
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import STATE_MESSAGE, encode_state
