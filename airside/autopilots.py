@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.flight_path import Own, decode_state
+from ftcc.airside.references import of_plant
+from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
     PROFILE_PARAMETERS,
     PROFILE_STATES,
@@ -26,7 +28,7 @@ from ftcc.airside.references.profiles import (
     refer,
     trigger_rows,
 )
-from ftcc.airside.scheme import Reference, Scheme
+from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, decode_command
@@ -57,7 +59,11 @@ class Autopilots(NamedTuple):
     own: NDArray[np.float64]
     """(k, 18): see `Own`."""
     reference: NDArray[np.float64]
-    """(k, 7): see `Reference`."""
+    """(k, n): the ``Reference`` of the scheme's plant."""
+    reference_parameters: NDArray[np.float64]
+    """(k, n): see `OwnReference`."""
+    reference_commands: NDArray[np.float64]
+    """(k, m, c): see `OwnReference`; unused rows have time inf. The last row is free for a command from the ground."""
     state: NDArray[np.float64]
     """(k, n): the scheme's ``State``."""
     output: NDArray[np.float64]
@@ -93,7 +99,7 @@ class Autopilots(NamedTuple):
     profile_state: NDArray[np.float64]
     """(k, 7): see `new_profile_state`."""
     leader_shares: NDArray[np.int64]
-    """(m,): which entries of `Reference` a leader shares; -1 = unused."""
+    """(m,): which entries of its `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
     """(n,): index into ``ACTUATORS`` of each of the scheme's commands."""
 
@@ -118,7 +124,19 @@ class LinkEvents(NamedTuple):
 @functools.cache
 def tick_of(scheme: str) -> ModuleType:
     """The compiled tick of a scheme, by name."""
-    return instantiate("ftcc.airside.tick", scheme, scheme=find(scheme).module)
+    law = find(scheme)
+    return instantiate("ftcc.airside.tick", scheme, scheme=law.module, references=of_plant(law.plant))
+
+
+def _commands_of(specs: Sequence[AutopilotSpec]) -> NDArray[np.float64]:
+    """The commands of the UAVs' own references as one table, with a free last row."""
+    tables = [spec.reference.commands for spec in specs]
+    width = max([1] + [len(row) for table in tables for row in table])
+    commands = np.full((len(specs), max(map(len, tables)) + 1, width), math.inf)
+    for rows, table in zip(commands, tables, strict=True):
+        for row, given in zip(rows, table, strict=False):
+            row[:] = given
+    return commands
 
 
 def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, Inbox]:
@@ -152,7 +170,9 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     return (
         Autopilots(
             own=np.zeros((k, len(Own._fields))),
-            reference=np.array([spec.mission for spec in specs], np.float64),
+            reference=np.array([spec.reference.initial for spec in specs], np.float64),
+            reference_parameters=np.array([spec.reference.parameters for spec in specs], np.float64),
+            reference_commands=_commands_of(specs),
             state=np.zeros((k, len(scheme.module.State._fields))),
             output=np.zeros((k, len(scheme.module.Output._fields))),
             started=np.zeros(k, np.int64),

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.references.longitudinal import Reference
 from ftcc.link.graph import Assumption, Graph
 
 __all__ = [
@@ -51,25 +52,6 @@ class Heard(NamedTuple):
     """(n,): 1 once the neighbour has been heard."""
     weight: NDArray[np.float64]
     """(n,): a_ij."""
-
-
-class Reference(NamedTuple):
-    """Commanded motion in the vertical plane: a leader's profile, or the mission constants that followers know."""
-
-    x: float
-    """Forward position, m."""
-    V: float
-    """Airspeed, m/s."""
-    V_dot: float
-    """m/s^2."""
-    z: float
-    """Altitude, m."""
-    z_dot: float
-    """m/s."""
-    z_ddot: float
-    """m/s^2."""
-    x_dot: float = 0.0
-    """Forward speed, m/s."""
 
 
 @dataclass(frozen=True)

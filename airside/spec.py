@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
-from ftcc.airside.scheme import Reference
 from ftcc.link.channel import Channel
 
-__all__ = ["AutopilotSpec", "LinkEvent", "Neighbour"]
+__all__ = ["AutopilotSpec", "LinkEvent", "Neighbour", "OwnReference"]
 
 
 @dataclass(frozen=True)
@@ -32,6 +31,17 @@ class LinkEvent:
 
 
 @dataclass(frozen=True)
+class OwnReference:
+    """What a UAV refers to by itself; what the numbers mean says the module of its plant in `references`."""
+
+    initial: tuple[float, ...]
+    """The ``Reference`` at t = 0."""
+    parameters: tuple[float, ...] = ()
+    commands: tuple[tuple[float, ...], ...] = ()
+    """In order of time (s), which each begins with."""
+
+
+@dataclass(frozen=True)
 class AutopilotSpec:
     """One autopilot."""
 
@@ -44,8 +54,8 @@ class AutopilotSpec:
     model: Model
     travel: tuple[float, ...]
     """Full deflection of each actuator (rad, N), by which commands are divided on the wire."""
-    mission: Reference
-    """What a follower knows without being told: the mission's speed."""
+    reference: OwnReference
+    """What this UAV refers to without being told by others."""
     neighbours: tuple[Neighbour, ...]
     channel: Channel
     """Quality of every in-edge at the start."""

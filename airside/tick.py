@@ -1,7 +1,7 @@
 """One tick of an autopilot: the stages between what was received and what is sent. A template, see `link.compiled`.
 
-The free name ``scheme`` is the module of the control law. `autopilots.tick_of` gives this module with a scheme filled
-in. The functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation.
+The free name ``scheme`` is the module of the control law, ``references`` that of what its UAVs refer to by themselves.
+`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ from typing import Any
 from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
-from ftcc.airside.scheme import Heard, Reference
+from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import hear
 from ftcc.link.compiled import compiled, fields, store
 
-__all__ = ["announce", "control", "hear_and_control"]
+__all__ = ["announce", "control", "hear_and_control", "refer"]
 
 if "scheme" not in globals():
     raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
 
 scheme: Any = globals()["scheme"]
+references: Any = globals()["references"]
 
 _State = scheme.State
 _Output = scheme.Output
@@ -30,6 +31,8 @@ _start = scheme.start
 _step = scheme.step
 _share = scheme.share
 _observe = scheme.observe
+_Reference = references.Reference
+_refer = references.refer
 _COMMANDS = len(scheme.COMMANDS)
 
 _LARGEST = 1e30
@@ -51,10 +54,17 @@ def _begin(autopilots, inbox, i, own, reference, gains):
 
 
 @compiled
+def refer(autopilots, i, now_us, period_us):
+    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick."""
+    parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
+    _refer(parameters, commands, autopilots.reference[i], now_us, period_us)
+
+
+@compiled
 def announce(autopilots, inbox, i):
     """Set ``shared`` from the state at this instant, before the law's step (exchange in two phases)."""
     own = fields(Own, autopilots.own[i])
-    reference = fields(Reference, autopilots.reference[i])
+    reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     _begin(autopilots, inbox, i, own, reference, gains)
     output = fields(_Output, autopilots.output[i])
@@ -69,7 +79,7 @@ def control(autopilots, inbox, i, dt):
     if the law gives a command that is not finite.
     """
     own = fields(Own, autopilots.own[i])
-    reference = fields(Reference, autopilots.reference[i])
+    reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     model = fields(Model, autopilots.model[i])
     _begin(autopilots, inbox, i, own, reference, gains)
@@ -89,7 +99,7 @@ def control(autopilots, inbox, i, dt):
 
 @compiled
 def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):
-    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles or the followers' law.
+    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles, or the followers' references and law.
 
     Followers' commands are written to ``controls`` as fractions of travel (k, 4). ``ok`` (k,) tells whose command is
     finite.
@@ -101,5 +111,6 @@ def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us)
             if autopilots.leader[i] == 1:
                 lead(autopilots, inbox, i, now_us, period_us)
             else:
+                refer(autopilots, i, now_us, period_us)
                 ok[i] = 1 if control(autopilots, inbox, i, period_us / 1e6) else 0
                 encode_command(autopilots.command[i], autopilots.travel[i], controls[i])

@@ -26,6 +26,7 @@ tick: Any = globals()["tick"]
 
 _announce = tick.announce
 _control = tick.control
+_refer = tick.refer
 
 HISTORY = 64
 """Records kept of each sender."""
@@ -166,6 +167,8 @@ def fly(
                 # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
                 _receive(ether, inbox, events, i, now, latency, seed)
                 lead(autopilots, inbox, i, now, period)
+            else:
+                _refer(autopilots, i, now, period)
         if not wire:
             for i in range(k):
                 if recording.lost[i] == 0:

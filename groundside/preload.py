@@ -11,9 +11,9 @@ from ftcc.airside import process as autopilot_process
 from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.autopilots import link_events, tick_of
 from ftcc.airside.model import Model
-from ftcc.airside.scheme import Reference
+from ftcc.airside.references import of_plant
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec
+from ftcc.airside.spec import AutopilotSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel
 from ftcc.link.timing import Timing
@@ -39,7 +39,7 @@ def load(scheme: str) -> None:
         gains=(0.0,) * len(law.gains_type._fields),
         model=Model(*(0.0,) * len(Model._fields)),
         travel=(0.0,) * len(ACTUATORS),
-        mission=Reference(*(0.0,) * len(Reference._fields)),
+        reference=OwnReference((0.0,) * len(of_plant(law.plant).Reference._fields)),
         neighbours=(),
         channel=Channel(),
     )

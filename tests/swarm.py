@@ -18,7 +18,7 @@ import numpy as np
 from ftcc.airside.autopilots import Autopilots, build, link_events, tick_of
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile
-from ftcc.airside.scheme import Reference, Scheme
+from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour
 from ftcc.link.actuators import ACTUATORS
@@ -100,7 +100,7 @@ def autopilot(uav: int = 1, form: str = "flight", **changes: Any) -> AutopilotSp
         "gains": tuple(scheme.gains(form, {})),
         "model": Model(*AIRFRAME, 0.0, 40.0, -0.7, 0.7, 20.0),
         "travel": vehicle().travel,
-        "mission": Reference(0.0, 30.0, 0.0, 0.0, 0.0, 0.0),
+        "reference": OwnReference((0.0, 30.0, 0.0, 0.0, 0.0, 0.0, 30.0)),
         "neighbours": tuple(Neighbour(j, WEIGHTS[uav, j]) for j in GRAPH.senders(uav)),
         "channel": Channel(),
         "profile": profile(uav) if leader else None,

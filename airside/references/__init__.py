@@ -1,1 +1,19 @@
-"""What is to be tracked: the leaders' profiles."""
+"""What is to be tracked: the leaders' profiles, and what a UAV refers to by itself.
+
+The latter is chosen by the scheme's ``PLANT``: the module of that name declares the NamedTuple ``Reference`` and the
+compiled ``refer(parameters, commands, reference, now_us, period_us)``, which brings a UAV's row of references to the
+tick at ``now_us`` and is called once at every tick. ``parameters`` (n,) and ``commands`` (m, c), rows with their time
+(s) first, are those of `ftcc.airside.spec.OwnReference`; a row whose time is inf is unused.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+__all__ = ["of_plant"]
+
+
+def of_plant(plant: str) -> ModuleType:
+    """The module of the references that UAVs on a plant have of their own."""
+    return importlib.import_module(f"{__name__}.{plant}")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from ftcc.airside.scheme import Reference
+from ftcc.airside.references.longitudinal import Reference
 from ftcc.link.compiled import compiled
 
 __all__ = [

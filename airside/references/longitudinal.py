@@ -1,0 +1,33 @@
+"""Motion in the vertical plane: the followers of leaders know the mission's constants, and nothing else by themselves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ftcc.link.compiled import compiled
+
+__all__ = ["Reference", "refer"]
+
+
+class Reference(NamedTuple):
+    """Commanded motion in the vertical plane: a leader's profile, or the mission constants that followers know."""
+
+    x: float
+    """Forward position, m."""
+    V: float
+    """Airspeed, m/s."""
+    V_dot: float
+    """m/s^2."""
+    z: float
+    """Altitude, m."""
+    z_dot: float
+    """m/s."""
+    z_ddot: float
+    """m/s^2."""
+    x_dot: float = 0.0
+    """Forward speed, m/s."""
+
+
+@compiled
+def refer(parameters, commands, reference, now_us, period_us):
+    """Constants stay what they are."""
