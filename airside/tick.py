@@ -1,7 +1,8 @@
 """One tick of an autopilot: the stages between what was received and what is sent. A template, see `link.compiled`.
 
 The free name ``scheme`` is the module of the control law, ``references`` that of what its UAVs refer to by themselves.
-`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`, in the autopilot process and in the single-process simulation.
+`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`, in the
+autopilot process and in the single-process simulation.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def control(autopilots, inbox, i, dt):
 
 @compiled
 def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):
-    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles, or the followers' references and law.
+    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles or the followers' law.
 
     Followers' commands are written to ``controls`` as fractions of travel (k, 4). ``ok`` (k,) tells whose command is
     finite.

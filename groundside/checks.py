@@ -228,6 +228,8 @@ def limits_of(plan: Plan, actuators: tuple[str, ...], findings: Findings) -> tup
             )
     for n, disturbance in enumerate(plan.disturbances):
         _require_followers(f"disturbances.{n}.uavs", disturbance.uavs or (), plan, findings)
+    for n, command in enumerate(plan.attitude.commands if plan.attitude is not None else ()):
+        _require_followers(f"attitude.commands.{n}.uavs", command.uavs or (), plan, findings)
     _require_followers("start.uav", plan.start.uav, plan, findings)
     if isinstance(plan.plant.initial_actuators, dict):
         for name in plan.plant.initial_actuators:
@@ -332,9 +334,9 @@ def check_scheme(
 def check_faults(plan: Plan, vehicles: list[VehicleSpec], findings: Findings) -> None:
     """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel."""
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
-    V = plan.mission.V
     for n, fault in enumerate(plan.faults):
         vehicle = by_uav[fault.uav]
+        V = plan.mission.V if plan.mission is not None else vehicle.initial[0]
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
         end = min(later, default=math.inf)
         low, high = vehicle.limits[ACTUATORS.index(fault.actuator)]

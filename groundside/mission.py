@@ -12,7 +12,7 @@ import tomli_w
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile, SpeedWave, Trigger, trigger_rows
-from ftcc.airside.scheme import Reference, Scheme
+from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec, Neighbour
 from ftcc.groundside.checks import (
     DISTURBANCES,
@@ -32,6 +32,7 @@ from ftcc.groundside.checks import (
 )
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.links import link_changes, link_texts
+from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import Claim, LeaderFields, Plan
@@ -99,6 +100,7 @@ def resolve(scenario: Scenario) -> Mission:
     true = Airframe(**values | ({} if plan.plant.elevator_lift else {"CLde": 0.0}))
     findings.stop_if_refused()
 
+    references = own_references(plan, scheme.plant, graph.followers, timing, findings)
     profiles = {uav: _profile(plan, uav, graph, findings) for uav in graph.leaders}
     findings.stop_if_refused()
     vehicles = [_aircraft(plan, uav, scheme.plant, true, limits, findings) for uav in graph.followers]
@@ -133,7 +135,7 @@ def resolve(scenario: Scenario) -> Mission:
             gains=tuple(gains[vehicle.uav]),
             model=model,
             travel=vehicle.travel,
-            mission=Reference(x=0.0, V=plan.mission.V, V_dot=0.0, z=0.0, z_dot=0.0, z_ddot=0.0, x_dot=plan.mission.V),
+            reference=references[vehicle.uav],
             neighbours=tuple(Neighbour(j, graph.weights[vehicle.uav, j]) for j in graph.senders(vehicle.uav)),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
@@ -299,6 +301,7 @@ def _planned(plan: Plan) -> tuple[tuple[float, int | None, str], ...]:
                 events.append((command.at, uav, f"leader commanded to {', '.join(asked)}"))
         if leader.cosine is not None:
             events.append((leader.cosine.at, uav, "leader begins its cosine in altitude"))
+    events += reference_texts(plan)
     events += link_texts(plan.link_events)
     ends = plan.duration + 1e-9
     return tuple(sorted((event for event in events if event[0] <= ends), key=lambda e: (e[0], e[1] or 0, e[2])))

@@ -301,6 +301,29 @@ class LeaderFields(Strict):
     climb_limit: float | None = Field(None, gt=0.0, description="m/s, largest climb rate of the profile")
 
 
+class AttitudeCommandFields(Strict):
+    """From ``at`` on: another commanded attitude with respect to the velocity; what is not given stays."""
+
+    at: float = Field(ge=0.0, description="s")
+    bank: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
+    alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
+    sideslip: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
+    uavs: list[Id] | None = Field(None, min_length=1, description="default: all followers")
+
+    @model_validator(mode="after")
+    def _commands_something(self) -> Self:
+        if self.bank is None and self.alpha is None and self.sideslip is None:
+            raise ValueError("needs some of bank, alpha, sideslip")
+        return self
+
+
+class AttitudeFields(Strict):
+    """The attitude that each UAV refers to by itself: commands through a second-order filter."""
+
+    filter: Filter = Filter(frequency=0.9, damping=0.3)
+    commands: list[AttitudeCommandFields] = Field(min_length=1)
+
+
 class DisturbanceFields(Strict):
     """Constant disturbances from ``at`` on."""
 
@@ -389,7 +412,8 @@ class Plan(Strict):
     channel: ChannelFields = ChannelFields()
     plant: Plant
     start: Starts
-    mission: MissionFields
+    mission: MissionFields | None = None
+    attitude: AttitudeFields | None = None
     leaders: dict[Id, LeaderFields] = {}
     gains: GainFields = GainFields()
     switches: dict[str, bool] = {}

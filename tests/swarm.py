@@ -20,7 +20,7 @@ from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour
+from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel, Inbox
 from ftcc.link.compiled import instantiate
