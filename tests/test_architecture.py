@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ftcc.airside.flight_path import Own, decode_state
-from ftcc.airside.scheme import Heard
+from ftcc.airside.scheme import Heard, Reference
 from ftcc.airside.schemes import find
 from ftcc.link.mavlink import float_array
 from tests.airside.autopilot_bench import Bench, forged
@@ -139,7 +139,7 @@ def runtime(tmp_path, monkeypatch):
 def test_an_autopilot_acts_on_the_messages_and_on_nothing_else(tmp_path, runtime):
     """Forged states, in which no equation of motion holds, are answered by exactly the law applied to them."""
     scheme, spec = find("containment"), autopilot(1)
-    law, gains = scheme.module, scheme.gains("flight", {})
+    law, gains, mission = scheme.module, scheme.gains("flight", {}), Reference(*spec.reference.initial)
     random = np.random.default_rng(1)
     nobody = Heard(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
     travel = np.array(vehicle().travel)
@@ -154,8 +154,8 @@ def test_an_autopilot_acts_on_the_messages_and_on_nothing_else(tmp_path, runtime
             decode_state(message, tick / 100, controls * travel, seen)
             own = Own(*seen.tolist())
             assert (own.z, own.V) == pytest.approx((drawn[0], drawn[1]), abs=1e-3)
-            state = state or law.start(own, nobody, spec.mission, spec.model, gains)
-            state, shown = law.step(state, own, nobody, spec.mission, spec.model, gains, 0.01)
+            state = state or law.start(own, nobody, mission, spec.model, gains)
+            state, shown = law.step(state, own, nobody, mission, spec.model, gains, 0.01)
             expected = np.float32([0.0, shown.elevator / 0.7, 0.0, shown.thrust / 40.0])
             assert np.array_equal(answered, expected), tick
 
