@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.groundside.metrics import DERIVED, METRICS, Signals, check_expression, evaluated, names_in, window_of
+from ftcc.groundside.metrics import DERIVED, METRICS, Signals, check_expression, evaluated, names_in, uavs_in, window_of
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 
 __all__ = ["Result", "Tolerance", "check_claims", "evaluate", "failed", "tolerance_of"]
 
-_TOLERANCE = re.compile(r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?\s*$")
+_TOLERANCE = re.compile(r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[0-9.eE+-]+))?\s*$")
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,8 @@ class Tolerance:
     size: float
     unit: str
     """"%": of the expected value; "x" (bounds only): times the expected value; "": as it stands."""
+    least: float = 0.0
+    """What a band of so many % is at least."""
 
     def allows(self, value: float, expected: float) -> bool:
         """Whether ``value`` is within the tolerance."""
@@ -37,30 +39,32 @@ class Tolerance:
         if self.bound:
             limit = self.size * abs(expected) if self.unit == "x" else self.size
             return value < limit if self.bound == "<" else value > limit
-        width = self.size / 100.0 * abs(expected) if self.unit == "%" else self.size
+        width = max(self.size / 100.0 * abs(expected), self.least) if self.unit == "%" else self.size
         # Expected values are decimal: a value on the edge of the band is within it.
         return abs(value - expected) <= width * (1.0 + 1e-12)
 
 
 def tolerance_of(text: str) -> Tolerance:
-    """Read a tolerance: "15 %", "0.02", "< 0.05", "> 2" or "< 1.5 x".
+    """Read a tolerance: "15 %", "0.02", "10 % or 0.01" (the larger), "< 0.05", "> 2" or "< 1.5 x".
 
     Raises
     ------
     ValueError
     """
     found = _TOLERANCE.match(text)
-    problem = f'{text!r} is no tolerance; write "15 %", "0.02", "< 0.05", "> 2" or "< 1.5 x"'
+    problem = f'{text!r} is no tolerance; write "15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"'
     if not found:
         raise ValueError(problem)
     try:
-        size = float(found["size"])
+        size, least = float(found["size"]), float(found["least"] or 0.0)
     except ValueError:
         raise ValueError(problem) from None
     bound, unit = found["bound"] or "", found["unit"] or ""
     if (unit == "x" and not bound) or (unit == "%" and bound) or (not bound and size < 0.0):
         raise ValueError(problem)
-    return Tolerance(text.strip(), bound, size, unit)
+    if least < 0.0 or (found["least"] and unit != "%"):
+        raise ValueError(problem)
+    return Tolerance(text.strip(), bound, size, unit, least)
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,7 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
         if claim.metric not in METRICS:
             problems.append(f"{where}: there is no metric {claim.metric!r}; there are {', '.join(METRICS)}")
             continue
+        others: set[int] = set()
         try:
             check_expression(claim.signal, columns)
         except ValueError as error:
@@ -118,7 +123,8 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
         else:
             if names_in(claim.signal) & set(DERIVED) and not led:
                 problems.append(f"{where}: signal {claim.signal!r} needs leaders that reach every follower")
-        strangers = sorted(set(_uavs_of(claim, graph)) - set(graph.uavs))
+            others = uavs_in(claim.signal)
+        strangers = sorted((set(_uavs_of(claim, graph)) | others) - set(graph.uavs))
         if strangers:
             problems.append(f"{where}: uavs {', '.join(map(str, strangers))} do not exist")
         for case, expected in claim.expected.items():

@@ -1,8 +1,8 @@
 """Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
 
-An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``. Beside the recorded columns there
-are, for followers of a graph with leaders, ``z_d`` (the altitude that its hull weights give it) and ``hull_distance``
-(how far it is above or below all leaders).
+An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
+same times. Beside the recorded columns there are, for followers of a graph with leaders, ``z_d`` (the altitude that its
+hull weights give it) and ``hull_distance`` (how far it is above or below all leaders).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ftcc.link.graph import Assumption, Graph, GraphError
 
-__all__ = ["DERIVED", "METRICS", "Metric", "Signals", "check_expression", "evaluated", "names_in", "window_of"]
+__all__ = ["DERIVED", "METRICS", "Metric", "Signals", "check_expression", "evaluated", "names_in", "uavs_in", "window_of"]
 
 Array = NDArray[np.float64]
 
@@ -95,9 +95,25 @@ def names_in(expression: str) -> set[str]:
         elif isinstance(node, ast.Constant):
             if not isinstance(node.value, (int, float)) or isinstance(node.value, bool):
                 raise ValueError(f"{expression!r}: {node.value!r} is not a number")
+        elif isinstance(node, ast.Subscript):
+            _other(expression, node)
         elif not isinstance(node, (ast.operator, ast.unaryop, ast.expr_context)):
             raise ValueError(f"{expression!r}: only arithmetic over columns is allowed")
     return {name for key, name in names if key not in called}
+
+
+def _other(expression: str, node: ast.Subscript) -> tuple[str, int]:
+    """Column and UAV of ``z[4]``."""
+    name, uav = node.value, node.slice
+    if isinstance(name, ast.Name) and isinstance(uav, ast.Constant) and type(uav.value) is int:
+        return name.id, uav.value
+    raise ValueError(f"{expression!r}: the z of UAV 4 is z[4]")
+
+
+def uavs_in(expression: str) -> set[int]:
+    """The UAVs that an expression names."""
+    subscripts = (node for node in ast.walk(_parsed(expression)) if isinstance(node, ast.Subscript))
+    return {_other(expression, node)[1] for node in subscripts}
 
 
 def check_expression(expression: str, columns: Iterable[str]) -> None:
@@ -110,7 +126,7 @@ def check_expression(expression: str, columns: Iterable[str]) -> None:
 
 def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
     """An expression for one UAV, at all its recorded times."""
-    values = {name: _column(name, signals, graph, uav) for name in names_in(expression)}
+    t = signals.column("t", uav)
 
     def value(node: ast.expr) -> Any:
         if isinstance(node, ast.BinOp):
@@ -121,14 +137,27 @@ def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Arra
             assert isinstance(node.func, ast.Name)
             return _FUNCTIONS[node.func.id](*(value(argument) for argument in node.args))
         if isinstance(node, ast.Name):
-            return values[node.id]
+            return _column(node.id, signals, graph, uav)
+        if isinstance(node, ast.Subscript):
+            name, other = _other(expression, node)
+            return _at(t, signals.column("t", other), _column(name, signals, graph, other))
         assert isinstance(node, ast.Constant)
         assert isinstance(node.value, (int, float))
         return np.float64(node.value)
 
     with np.errstate(all="ignore"):
         result = np.asarray(value(_parsed(expression)), np.float64)
-    return np.broadcast_to(result, signals.column("t", uav).shape)
+    return np.broadcast_to(result, t.shape)
+
+
+def _at(t: Array, times: Array, values: Array) -> Array:
+    """``values`` of ``times`` at the times ``t``; nan where there is none."""
+    found = np.full(len(t), np.nan)
+    if len(times):
+        place = np.minimum(np.searchsorted(times, t - _CLOSE), len(times) - 1)
+        there = np.abs(times[place] - t) <= _CLOSE
+        found[there] = values[place][there]
+    return found
 
 
 def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
@@ -151,15 +180,7 @@ def _leaders_altitudes(signals: Signals, graph: Graph, t: Array) -> Array:
         graph.require(Assumption.LEADERS_REACH_ALL)
     except GraphError as error:
         raise ValueError(f"z_d and hull_distance need leaders: {error}") from None
-    rows = np.full((len(graph.leaders), len(t)), np.nan)
-    for row, leader in zip(rows, graph.leaders, strict=True):
-        times, z = signals.column("t", leader), signals.column("z", leader)
-        if len(times) == 0:
-            continue
-        place = np.minimum(np.searchsorted(times, t - _CLOSE), len(times) - 1)
-        found = np.abs(times[place] - t) <= _CLOSE
-        row[found] = z[place][found]
-    return rows
+    return np.array([_at(t, signals.column("t", uav), signals.column("z", uav)) for uav in graph.leaders])
 
 
 def window_of(t: Array, window: tuple[float, float]) -> slice:
@@ -201,6 +222,15 @@ def _duration_above(t: Array, x: Array, threshold: float) -> float:
     return float((x >= threshold).sum()) * spacing
 
 
+def _departure(t: Array, x: Array, seconds: float) -> float:
+    return float(np.abs(x - x[t <= t[0] + seconds + _CLOSE].mean()).max())
+
+
+def _time_until_settled(t: Array, x: Array, threshold: float) -> float:
+    last_fifth = t >= t[-1] - 0.2 * (t[-1] - t[0]) - _CLOSE
+    return _time_until_below(t, x - x[last_fifth].mean(), threshold)
+
+
 METRICS = {
     "value_at": Metric(lambda t, x, _: float(x[-1]), "farthest", "value at the end of the window"),
     "max_abs": Metric(lambda t, x, _: float(np.abs(x).max()), "max", "largest absolute value"),
@@ -208,12 +238,22 @@ METRICS = {
     "min": Metric(lambda t, x, _: float(x.min()), "min", "smallest value"),
     "mean": Metric(lambda t, x, _: float(x.mean()), "farthest", "mean"),
     "std": Metric(lambda t, x, _: float(x.std()), "max", "standard deviation"),
+    "peak_to_peak": Metric(lambda t, x, _: float(np.ptp(x)), "max", "largest minus smallest value"),
     "rms": Metric(lambda t, x, _: float(np.sqrt((x * x).mean())), "max", "root mean square"),
     "integral_of_square": Metric(
         lambda t, x, _: float(np.trapezoid(x * x, t)), "max", "integral of the square over the window"
     ),
     "time_until_below": Metric(
         _time_until_below, "max", "time from the window's beginning until abs(x) stays within the threshold, s", True
+    ),
+    "time_until_settled": Metric(
+        _time_until_settled,
+        "max",
+        "time from the window's beginning until x stays within the threshold of its mean over the window's last fifth, s",
+        True,
+    ),
+    "departure": Metric(
+        _departure, "max", "largest distance from the mean over the window's first seconds, threshold of them", True
     ),
     "first_time": Metric(_first_time, "max", "time at which abs(x) first reaches the threshold, s", True),
     "duration_above": Metric(_duration_above, "max", "time for which x is at or above the threshold, s", True),

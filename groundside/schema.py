@@ -378,7 +378,7 @@ class Claim(Strict):
     unit: str = ""
     source: str
     expected: dict[str, float | list[float]]
-    tolerance: str | dict[str, str] = Field(description='"15 %", "0.02", "< 0.05", "> 2" or "< 1.5 x"; by case')
+    tolerance: str | dict[str, str] = Field(description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; by case')
 
     @model_validator(mode="after")
     def _window_in_order(self) -> Self:

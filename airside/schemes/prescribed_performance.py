@@ -154,12 +154,12 @@ class Output(NamedTuple):
 
 
 SHARED = {
-    "follower": (Q("z_d", "m", "estimated altitude of the leader"), Q("v", "m/s", "rate of the reference")),
+    "follower": (Q("zhat", "m", "estimated altitude of the leader"), Q("v", "m/s", "rate of the reference")),
     "leader": (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate")),
 }
 _S = quantities(State)
 SIGNALS = (
-    _S["z_d"],
+    Q("zhat", "m", "estimated altitude of the leader"),
     Q("z_r", "m", "altitude reference that the law tracks"),
     Q("z_h", "m", "altitude as the law sees it"),
     Q("e2", "m", "altitude error that the tube bounds", bound="epsilon"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ftcc.groundside.claims import Result, evaluate, tolerance_of
+from ftcc.groundside.claims import Result, check_claims, evaluate, tolerance_of
 from ftcc.groundside.metrics import METRICS, check_expression, evaluated
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
@@ -53,17 +53,19 @@ def known() -> Known:
     )
 
 
+STANDARD: dict[str, Any] = {
+    "name": "claim",
+    "metric": "max_abs",
+    "signal": "x",
+    "window": (0.0, 10.0),
+    "source": "here",
+    "expected": {"flight": 2.0},
+    "tolerance": "1 %",
+}
+
+
 def result(known: Known, **fields: Any) -> Result:
-    standard = {
-        "name": "claim",
-        "metric": "max_abs",
-        "signal": "x",
-        "window": (0.0, 10.0),
-        "source": "here",
-        "expected": {"flight": 2.0},
-        "tolerance": "1 %",
-    }
-    (one,) = evaluate(known, [Claim.model_validate(standard | fields)], "flight", GRAPH)
+    (one,) = evaluate(known, [Claim.model_validate(STANDARD | fields)], "flight", GRAPH)
     return one
 
 
@@ -82,6 +84,8 @@ def test_the_containment_point_is_the_hull_weights_combination_of_the_leaders(kn
         ("mean", None, 0.0),
         ("std", None, math.sqrt(0.5)),
         ("rms", None, math.sqrt(0.5)),
+        ("peak_to_peak", None, 2.0),
+        ("departure", 1.0, 1.0),
         ("integral_of_square", None, 5.0),
         ("first_time", 0.5, 0.09),
         ("time_until_below", 1.5, 0.0),
@@ -110,6 +114,27 @@ def test_time_until_below_counts_from_the_windows_beginning_to_the_last_exceedan
 def test_a_signal_that_never_settles_fails(known: Known) -> None:
     one = result(known, metric="time_until_below", threshold=0.0001, uavs=[1], signal="1 + x / 10", tolerance="< 5")
     assert (one.value, one.ok) == (None, False)
+
+
+def test_time_until_settled_counts_until_the_signal_stays_near_its_last_fifth(known: Known) -> None:
+    """exp(-t) stays within 0.05 of its mean over 8-10 s, 1e-4, from ln 20 on."""
+    settled = METRICS["time_until_settled"].function
+    assert settled(T, np.exp(-T), 0.05) == pytest.approx(math.log(20.0), abs=0.02)
+    assert settled(T + 30.0, 7.0 - np.exp(-T), 0.05) == pytest.approx(math.log(20.0), abs=0.02)
+    assert settled(T, T, 0.5) == math.inf
+
+
+def test_departure_is_measured_from_the_mean_before(known: Known) -> None:
+    """A ramp over 10 s: 9 above its mean over the first 2 s."""
+    assert METRICS["departure"].function(T + 29.0, 5.0 + T, 2.0) == pytest.approx(9.0)
+
+
+def test_an_expression_may_look_at_another_uav_at_the_same_times(known: Known) -> None:
+    np.testing.assert_allclose(evaluated("z - z[7]", known, GRAPH, 1), np.exp(-T) - 25.0)
+    known.data[("z", 7)] = known.data[("z", 7)][:501]
+    np.testing.assert_array_equal(np.isnan(evaluated("z - z[7]", known, GRAPH, 1)), T > 5.0)
+    claim = Claim.model_validate(STANDARD | {"signal": "z - z[3]"})
+    assert check_claims([claim], GRAPH, ["z"]) == ["claims.0 (claim): uavs 3 do not exist"]
 
 
 def test_the_worst_uav_decides(known: Known) -> None:
@@ -152,6 +177,9 @@ def test_nan_fails(known: Known) -> None:
         ("0.02", 1.97, False),
         ("0", 2.0, True),
         ("0", 2.0001, False),
+        ("10 % or 0.01", 2.2, True),
+        ("10 % or 0.3", 2.3, True),
+        ("10 % or 0.3", 2.31, False),
         ("< 0.05", 0.04, True),
         ("< 0.05", 0.05, False),
         ("> 3", 3.5, True),
@@ -165,7 +193,7 @@ def test_tolerances(text: str, value: float, allowed: bool) -> None:
     assert tolerance_of(text).allows(value, 2.0) is allowed
 
 
-@pytest.mark.parametrize("text", ["", "x", "15 % x", "< 5 %", "1.5 x", "-3", "1e", "about 3"])
+@pytest.mark.parametrize("text", ["", "x", "15 % x", "< 5 %", "1.5 x", "-3", "1e", "about 3", "0.2 or 3", "< 3 or 4", "10 % or"])
 def test_no_tolerance(text: str) -> None:
     with pytest.raises(ValueError, match="is no tolerance"):
         tolerance_of(text)
@@ -175,7 +203,10 @@ def test_no_tolerance(text: str) -> None:
     "expression",
     [
         "z.__class__",
-        "z[0]",
+        "z[-1]",
+        "z[x]",
+        "z[1:2]",
+        "(z + x)[1]",
         "(lambda: 1)()",
         "z if z else x",
         "'a'",
@@ -188,7 +219,7 @@ def test_no_tolerance(text: str) -> None:
     ],
 )
 def test_expressions_are_arithmetic_and_nothing_else(expression: str) -> None:
-    with pytest.raises(ValueError, match=r"arithmetic|functions|operators|number|no expression"):
+    with pytest.raises(ValueError, match=r"arithmetic|functions|operators|number|no expression|z\[4\]"):
         check_expression(expression, ["z", "x"])
 
 
