@@ -1,18 +1,31 @@
-"""Compensation of the actuators' lag (not in the monograph)."""
+"""Model of the actuators' lag, and its compensation (not in the monograph)."""
 
 from __future__ import annotations
 
 import math
 
+from ftcc.airside.elements.filters import low_pass_step
 from ftcc.link.compiled import compiled
 
-__all__ = ["lead_filter", "leading_command", "modelled_position"]
+__all__ = ["lead_filter", "leading_command", "modelled_position", "modelled_stroke"]
 
 
 @compiled
 def modelled_position(position, in_force, lag, h):  # type: ignore[no-untyped-def]
     """Position of a first-order actuator of bandwidth ``lag`` (rad/s) after ``h`` seconds of the command in force."""
     return in_force + (position - in_force) * math.exp(-lag * h)
+
+
+@compiled
+def modelled_stroke(position, in_force, time_constant, h):  # type: ignore[no-untyped-def]
+    """Mean position of a first-order actuator over ``h`` seconds of the command in force, and its position after them.
+
+    A time constant of 0 s is an actuator without lag.
+    """
+    if time_constant <= 0.0:
+        return in_force, in_force
+    after = low_pass_step(position, in_force, time_constant, h)
+    return in_force + (position - after) * time_constant / h, after
 
 
 @compiled

@@ -14,9 +14,11 @@ __all__ = [
     "first_order_rate",
     "high_gain_observer",
     "limited_tracker",
+    "low_pass_step",
     "reference_shaper",
     "second_order_reference_step",
     "sliding_mode_differentiator",
+    "sliding_mode_differentiator_step",
 ]
 
 
@@ -66,6 +68,31 @@ def sliding_mode_differentiator(value, derivative, target, mu1, mu2):  # type: i
     """
     error = value - target
     return -mu1 * math.sqrt(abs(error)) * sign(error) + derivative, -mu2 * sign(error)
+
+
+@compiled
+def sliding_mode_differentiator_step(value, derivative, target, mu1, mu2, h):  # type: ignore[no-untyped-def]
+    """`sliding_mode_differentiator` after an implicit step of length ``h``, in closed form; ``target`` is the new one.
+
+    Steps itself: explicit steps chatter with an amplitude that a law would pass on to its actuators.
+
+    Returns
+    -------
+    value, derivative
+    """
+    ahead = value + h * derivative - target
+    if abs(ahead) <= h * h * mu2:
+        return target, derivative - ahead / h
+    root = 0.5 * (math.sqrt(h * h * mu1 * mu1 + 4.0 * (abs(ahead) - h * h * mu2)) - h * mu1)
+    return target + root * root * sign(ahead), derivative - h * mu2 * sign(ahead)
+
+
+@compiled
+def low_pass_step(value, target, time_constant, h):  # type: ignore[no-untyped-def]
+    """A first-order low-pass after ``h`` seconds of a constant ``target``, exactly; a time constant of 0 is none."""
+    if time_constant <= 0.0:
+        return target
+    return target + (value - target) * math.exp(-h / time_constant)
 
 
 @compiled

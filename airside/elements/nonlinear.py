@@ -6,7 +6,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["limited", "sign", "signed_power"]
+__all__ = ["limited", "rounded_power", "sign", "signed_power"]
 
 
 @compiled
@@ -21,6 +21,15 @@ def sign(value: float) -> float:
 def signed_power(value: float, exponent: float) -> float:
     """abs(value)^exponent sign(value), eqs. (6.22), (6.32); for 0 < exponent < 1 continuous, steep at 0."""
     return math.pow(abs(value), exponent) * sign(value)
+
+
+@compiled
+def rounded_power(value: float, exponent: float, width: float) -> tuple[float, float]:
+    """`signed_power`, made linear where abs(value) <= width, and its slope: chapter 9 [R]."""
+    if abs(value) <= width:
+        slope = math.pow(width, exponent - 1.0)
+        return slope * value, slope
+    return signed_power(value, exponent), exponent * math.pow(abs(value), exponent - 1.0)
 
 
 @compiled

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+from ftcc.airside.elements.filters import sliding_mode_differentiator_step
 from ftcc.airside.elements.nonlinear import signed_power
 from ftcc.link.compiled import compiled
 
 __all__ = [
     "disturbance_observer_rate",
     "finite_time_observer",
+    "reference_system_step",
     "sliding_mode_observer",
     "unexplained_acceleration",
 ]
@@ -37,6 +39,27 @@ def unexplained_acceleration(gain, rate, state, explained):  # type: ignore[no-u
     """
     estimate = gain * (rate - state)
     return estimate, explained + estimate
+
+
+@compiled
+def reference_system_step(model, gap, value, derivative, rate, explained, gain, bound, h):  # type: ignore[no-untyped-def]
+    """Sliding-mode estimate of the part of an acceleration that a model does not explain: chapter 9 [R].
+
+    The reference system model' = explained + gain gap, gap = rate - model, makes gap' = d - gain gap; a Levant
+    differentiator of the gap with ``bound`` > abs(gap'') then gives d exactly after a finite time. Steps itself over the
+    last ``h`` seconds, in which ``explained`` is the mean of the modelled acceleration.
+
+    Returns
+    -------
+    d_hat, model, gap, value, derivative : float
+        The estimate; then the states: reference system, gap, and the differentiator's two.
+    """
+    model += h * (explained + gain * gap)
+    new_gap = rate - model
+    value, derivative = sliding_mode_differentiator_step(
+        value, derivative, new_gap, 1.5 * math.sqrt(bound), 1.1 * bound, h
+    )
+    return derivative + gain * gap, model, new_gap, value, derivative
 
 
 @compiled

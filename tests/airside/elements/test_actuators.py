@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ftcc.airside.elements.actuators import lead_filter, leading_command, modelled_position
+from ftcc.airside.elements.actuators import lead_filter, leading_command, modelled_position, modelled_stroke
 from tests.airside.elements.motion import integrated
 
 T = np.linspace(0.0, 0.5, 26)
@@ -18,6 +18,15 @@ def test_modelled_position_is_the_exact_lag_whatever_the_steps():
     for _ in range(10):
         many = modelled_position(many, 0.5, 20.0, 0.01)
     assert one == pytest.approx(0.5 - 0.7 * np.exp(-2.0)) == pytest.approx(many)
+
+
+def test_modelled_stroke_is_the_mean_of_the_exact_lag():
+    t = np.linspace(0.0, 0.1, 1001)
+    position = 0.5 - 0.7 * np.exp(-t / 0.05)
+    mean, after = modelled_stroke(-0.2, 0.5, 0.05, 0.1)
+    assert mean == pytest.approx(np.trapezoid(position, t) / 0.1, abs=1e-6)
+    assert after == pytest.approx(position[-1])
+    assert modelled_stroke(-0.2, 0.5, 0.0, 0.1) == (0.5, 0.5)
 
 
 def test_a_lagging_actuator_under_the_leading_command_is_a_fast_one():

@@ -14,9 +14,11 @@ from ftcc.airside.elements.filters import (
     first_order_rate,
     high_gain_observer,
     limited_tracker,
+    low_pass_step,
     reference_shaper,
     second_order_reference_step,
     sliding_mode_differentiator,
+    sliding_mode_differentiator_step,
 )
 from tests.airside.elements.motion import integrated
 
@@ -65,6 +67,47 @@ def test_differentiator_follows_a_sine_exactly_after_a_finite_time():
 
 def test_differentiator_stands_still_on_a_constant():
     assert sliding_mode_differentiator(1.5, 0.0, 1.5, 6.0, 10.0) == (0.0, 0.0)
+
+
+def differentiated(h: float, step: bool) -> np.ndarray:
+    """Derivative of sin(2 t) by the differentiator for abs(x'') < 10, from 2 s on; implicit steps or Euler's."""
+    value, derivative, found = 0.0, 0.0, []
+    for k in range(1, round(4.0 / h)):
+        target = math.sin(2.0 * k * h)
+        if step:
+            value, derivative = sliding_mode_differentiator_step(value, derivative, target, 6.0, 10.0, h)
+        else:
+            value_rate, derivative_rate = sliding_mode_differentiator(value, derivative, target, 6.0, 10.0)
+            value, derivative = value + h * value_rate, derivative + h * derivative_rate
+        found.append(derivative)
+    return np.array(found)[round(2.0 / h) :]
+
+
+def test_implicit_differentiator_follows_within_half_a_step_and_does_not_chatter():
+    for h in (0.001, 0.01, 0.02):
+        t = np.arange(round(2.0 / h) + 1, round(4.0 / h)) * h
+        exact, implicit, explicit = 2.0 * np.cos(2.0 * t), differentiated(h, True), differentiated(h, False)
+        # Once the value slides, the derivative is the difference quotient over the last step.
+        assert np.abs(implicit - 2.0 * np.cos(2.0 * (t - 0.5 * h))).max() < h * h
+        assert np.abs(np.diff(implicit)).max() < 1.01 * np.abs(np.diff(exact)).max()
+        assert np.abs(np.diff(explicit)).max() > 2.0 * np.abs(np.diff(implicit)).max()
+
+
+def test_implicit_differentiator_tends_to_the_continuous_one():
+    value, derivative, h = 1.0, 0.0, 1e-4
+    reference = integrated(
+        lambda t, y: sliding_mode_differentiator(y[0], y[1], 0.0, 6.0, 10.0), [1.0, 0.0], np.linspace(0.0, 0.1, 3)
+    )
+    for _ in range(1000):
+        value, derivative = sliding_mode_differentiator_step(value, derivative, 0.0, 6.0, 10.0, h)
+    assert (value, derivative) == pytest.approx(reference[:, -1], abs=20.0 * h)
+
+
+def test_low_pass_in_steps_is_the_exact_one():
+    one = low_pass_step(1.0, 3.0, 0.15, 0.1)
+    halves = low_pass_step(low_pass_step(1.0, 3.0, 0.15, 0.05), 3.0, 0.15, 0.05)
+    assert one == pytest.approx(3.0 - 2.0 * math.exp(-0.1 / 0.15)) == pytest.approx(halves)
+    assert low_pass_step(1.0, 3.0, 0.0, 0.1) == 3.0
 
 
 def test_complementary_filter_follows_a_climb_at_once_and_forgets_an_offset():

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from ftcc.airside.elements.observers import (
     disturbance_observer_rate,
     finite_time_observer,
+    reference_system_step,
     sliding_mode_observer,
     unexplained_acceleration,
 )
@@ -46,6 +47,21 @@ def test_unexplained_acceleration_converges_with_its_gain():
 
 def test_switched_off_the_unexplained_acceleration_is_zero():
     assert unexplained_acceleration(0.0, 1.0, 0.0, 3.0) == (0.0, 3.0)
+
+
+@pytest.mark.parametrize("h", [0.001, 0.02])
+def test_reference_system_finds_the_disturbance_exactly_after_a_finite_time(h):
+    """A jump and a ramp of a disturbance beside a known acceleration; abs(gap'') < 50 m/s^3, but at the jump."""
+    rate, states = 3.0, (3.0, 0.0, 0.0, 0.0)
+    late = []
+    for k in range(round(3.0 / h)):
+        t = (k + 0.5) * h
+        known, disturbance = math.cos(5.0 * t), (-2.0 if t > 1.0 else 0.0) + 0.5 * t
+        rate += h * (known + disturbance)
+        estimate, *states = reference_system_step(*states, rate, known, 5.0, 50.0, h)
+        if t < 1.0 or t > 1.5:
+            late.append(abs(estimate - disturbance))
+    assert max(late[round(0.2 / h) :]) < 5.0 * h
 
 
 def test_observer_of_a_climbing_leader_lags_by_the_root_of_its_law():
