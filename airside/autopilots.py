@@ -33,7 +33,7 @@ from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
-from ftcc.link.compiled import compiled, copy, instantiate
+from ftcc.link.compiled import compiled, copy, instantiate, width
 from ftcc.link.timing import Timing
 
 __all__ = [
@@ -143,7 +143,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     """Arrays for ``specs``, which share one scheme, before the first tick."""
     scheme: Scheme = find(specs[0].scheme)
     k = len(specs)
-    width = scheme.shared_width
+    values = scheme.shared_width
     profiles = [profile_arrays(spec.profile, timing.period) if spec.profile else None for spec in specs]
     rows = max([1] + [len(pair[1]) for pair in profiles if pair])
     commands = np.full((k, rows, 3), math.inf)
@@ -158,7 +158,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
                 spec.profile, spec.uav, [n.uav for n in spec.neighbours]
             )
             states[i] = new_profile_state(spec.profile)
-    inbox = new_inbox([[n.uav for n in spec.neighbours] for spec in specs], [s.uav for s in specs], width, Channel())
+    inbox = new_inbox([[n.uav for n in spec.neighbours] for spec in specs], [s.uav for s in specs], values, Channel())
     weight = np.zeros(inbox.valid.shape)
     for i, spec in enumerate(specs):
         inbox.quality[i, :] = spec.channel
@@ -173,8 +173,8 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             reference=np.array([spec.reference.initial for spec in specs], np.float64),
             reference_parameters=np.array([spec.reference.parameters for spec in specs], np.float64),
             reference_commands=_commands_of(specs),
-            state=np.zeros((k, len(scheme.module.State._fields))),
-            output=np.zeros((k, len(scheme.module.Output._fields))),
+            state=np.zeros((k, width(scheme.module.State))),
+            output=np.zeros((k, width(scheme.module.Output))),
             started=np.zeros(k, np.int64),
             gains=np.array([spec.gains for spec in specs], np.float64),
             model=np.array([spec.model for spec in specs], np.float64),
@@ -182,7 +182,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             leader=leader,
             command=np.zeros((k, 4)),
             target=np.zeros((k, 7)),
-            shared=np.zeros((k, width)),
+            shared=np.zeros((k, values)),
             signals=signals,
             travel=np.array([spec.travel for spec in specs], np.float64),
             offset=np.array([spec.offset for spec in specs], np.float64),
@@ -190,7 +190,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             profile_commands=commands,
             profile_triggers=triggers,
             profile_state=states,
-            leader_shares=np.array(shares + [-1] * (width - len(shares)), np.int64),
+            leader_shares=np.array(shares + [-1] * (values - len(shares)), np.int64),
             actuator=np.array([ACTUATORS.index(name) for name in scheme.commands], np.int64),
         ),
         inbox,

@@ -86,15 +86,16 @@ def control(autopilots, inbox, i, dt):
     _begin(autopilots, inbox, i, own, reference, gains)
     before = fields(_State, autopilots.state[i])
     after, output = _step(before, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
+    shown = autopilots.output[i]
+    store(output, shown)
     for n in range(_COMMANDS):
-        if not abs(output[n]) < _LARGEST:
+        if not abs(shown[n]) < _LARGEST:
             return False
     store(after, autopilots.state[i])
-    store(output, autopilots.output[i])
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
     store(_observe(before, own, reference, output, gains), autopilots.signals[i])
     for n in range(_COMMANDS):
-        autopilots.command[i, autopilots.actuator[n]] = output[n]
+        autopilots.command[i, autopilots.actuator[n]] = shown[n]
     return True
 
 

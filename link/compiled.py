@@ -7,18 +7,35 @@ module, which sets ``NUMBA_CACHE_DIR``, is the only one that imports numba.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib.metadata
 import importlib.util
+import math
 import os
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
-__all__ = ["SCHEME_ENTRY_POINTS", "cache_folder", "compiled", "copy", "fields", "fill", "instantiate", "store"]
+import numpy as np
+
+__all__ = [
+    "SCHEME_ENTRY_POINTS",
+    "Room",
+    "Vector",
+    "cache_folder",
+    "compiled",
+    "copy",
+    "fields",
+    "fill",
+    "instantiate",
+    "store",
+    "width",
+]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -62,6 +79,7 @@ os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from numba.core import types  # noqa: E402
+from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import overload  # noqa: E402
 from numba.np.unsafe.ndarray import to_fixed_tuple  # noqa: E402
 
@@ -77,25 +95,108 @@ def compiled(function: F) -> F:
     return numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(function)  # type: ignore[no-any-return]
 
 
+Vector = tuple[float, float, float]
+"""Three axes; vector algebra on tuples costs no memory."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Annotation of a field of a NamedTuple that is an array of this shape, modified in place."""
+
+    shape: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        return math.prod(self.shape)
+
+
+@functools.cache
+def _layout(cls: Any) -> tuple[tuple[int, int, int | Room], ...]:
+    """First entry, end, and number of floats (or `Room`) of each field of a NamedTuple class in a vector."""
+    hints = get_type_hints(cls, include_extras=True)
+    layout: list[tuple[int, int, int | Room]] = []
+    at = 0
+    for name in cls._fields:
+        hint = hints[name]
+        rooms = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Room)]
+        parts = get_args(hint.__origin__ if hasattr(hint, "__metadata__") else hint)
+        what = rooms[0] if rooms else max(1, len(parts))
+        end = at + (what.size if isinstance(what, Room) else what)
+        layout.append((at, end, what))
+        at = end
+    return tuple(layout)
+
+
+def width(cls: Any) -> int:
+    """How many floats a NamedTuple class takes in a vector."""
+    return _layout(cls)[-1][1]
+
+
 def fields(cls: Any, values: Any) -> Any:
-    """The NamedTuple ``cls`` (floats only) from the first entries of the vector ``values``."""
-    return cls(*values[: len(cls._fields)].tolist())
+    """The NamedTuple ``cls`` from the first entries of the vector ``values``.
+
+    Its fields are floats, tuples of floats (`Vector`), or, where annotated with `Room`, views of ``values``.
+    """
+    if width(cls) == len(cls._fields):
+        return cls(*values[: len(cls._fields)].tolist())
+    made: list[Any] = []
+    for at, end, what in _layout(cls):
+        entries = values[at:end]
+        if isinstance(what, Room):
+            made.append(entries.reshape(what.shape))
+        else:
+            made.append(tuple(entries.tolist()) if what > 1 else float(entries[0]))
+    return cls(*made)
 
 
 @overload(fields)
 def _fields_compiled(cls, values):
     if not isinstance(cls, types.NamedTupleClass):
         return None
-    kind = cls.instance_class
-    size = len(kind._fields)
-    return lambda cls, values: kind(*to_fixed_tuple(values, size))
+    kind: Any = cls.instance_class
+    size = width(kind)
+    if size == len(kind._fields):
+        return lambda cls, values: kind(*to_fixed_tuple(values, size))
+    made = []
+    for at, end, what in _layout(kind):
+        if isinstance(what, Room):
+            made.append(f"values[{at}:{end}].reshape({what.shape})" if len(what.shape) > 1 else f"values[{at}:{end}]")
+        else:
+            entries = ", ".join(f"values[{n}]" for n in range(at, end))
+            made.append(f"({entries})" if what > 1 else entries)
+    return eval(f"lambda cls, values: kind({', '.join(made)})", {"kind": kind})
 
 
-@compiled
-def store(record, values):
-    """Write a tuple of floats into the first entries of the vector ``values``; the inverse of `fields`."""
-    for i in range(len(record)):
-        values[i] = record[i]
+def store(record: Any, values: Any) -> None:
+    """Write a tuple into the first entries of the vector ``values``; the inverse of `fields`."""
+    at = 0
+    for field in record:
+        entries = np.ravel(field)
+        values[at : at + len(entries)] = entries
+        at += len(entries)
+
+
+@overload(store)
+def _store_compiled(record, values):
+    if isinstance(record, UniTuple | NamedUniTuple) and record.dtype == types.float64:
+
+        def store_floats(record, values):
+            for n in range(len(record)):
+                values[n] = record[n]
+
+        return store_floats
+    lines = ["def store_fields(record, values):", "    at = 0"]
+    for n, field in enumerate(record.types):
+        if isinstance(field, BaseTuple):
+            lines += [f"    values[at + {m}] = record[{n}][{m}]" for m in range(len(field))]
+            lines.append(f"    at += {len(field)}")
+        elif isinstance(field, types.Array):
+            lines += [f"    for entry in record[{n}].flat:", "        values[at] = entry", "        at += 1"]
+        else:
+            lines += [f"    values[at] = record[{n}]", "    at += 1"]
+    made: dict[str, Any] = {}
+    exec("\n".join(lines), made)
+    return made["store_fields"]
 
 
 @compiled

@@ -7,12 +7,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
 import ftcc.link
-from ftcc.link.compiled import compiled, copy, fields, fill, instantiate, store
+from ftcc.link.compiled import Room, Vector, compiled, copy, fields, fill, instantiate, store, width
 from tests.swarm import AIRFRAME
 
 REPOSITORY = Path(__file__).parents[2]
@@ -156,3 +157,28 @@ def test_copy_and_fill():
     assert target.tolist() == [1.0, 2.0, 3.0, 0.0, 0.0]
     fill(target, 7.0)
     assert (target == 7.0).all()
+
+
+class Mixed(NamedTuple):
+    """A record of everything that `fields` knows."""
+
+    a: float
+    v: Vector
+    table: Annotated[np.ndarray, Room((2, 3))]
+    b: Annotated[float, "with a note"]
+    row: Annotated[np.ndarray, Room((2,))]
+
+
+@compiled
+def _turned(values):
+    before = fields(Mixed, values)
+    before.table[1, 2] += before.v[1]
+    store(Mixed(before.b, (before.v[2], before.v[0], before.v[1]), before.table, before.a, before.row), values)
+
+
+@pytest.mark.parametrize("function", [_turned, getattr(_turned, "py_func", _turned)], ids=["compiled", "plain"])
+def test_records_of_floats_vectors_and_arrays_lie_in_one_vector(function):
+    assert width(Mixed) == 13
+    values = np.arange(13.0)
+    function(values)
+    assert values.tolist() == [10, 3, 1, 2, 4, 5, 6, 7, 8, 9 + 2, 0, 11, 12]
