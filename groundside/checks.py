@@ -6,24 +6,23 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ftcc.airside.references.profiles import Profile, largest_acceleration, largest_climb
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
-from ftcc.groundside.schema import Plan
-from ftcc.link.actuators import ACTUATORS
+from ftcc.groundside.schema import Plan, Start
+from ftcc.link.actuators import ACTUATORS, SLOT, unit_of
 from ftcc.link.graph import Graph, GraphError
 from ftcc.link.timing import Timing
-from ftcc.sim.airframe import Airframe
+from ftcc.sim import plants
 from ftcc.sim.spec import VehicleSpec
-from ftcc.sim.trim import Trim, TrimError, trim
+from ftcc.sim.trim import TrimError
 
 __all__ = [
-    "DISTURBANCES",
     "IDEAL",
-    "PLANT_ACTUATORS",
     "Findings",
     "check_delays",
     "check_faults",
@@ -32,27 +31,16 @@ __all__ = [
     "graph_of",
     "level_trim",
     "limits_of",
+    "plant_of",
     "scheme_of",
     "timing_of",
-    "unit_of",
 ]
 
 IDEAL = "monograph"
 """The form with ideal exchange, which no processes can fly."""
 
-PLANT_ACTUATORS = {"longitudinal": ("thrust", "elevator")}
-"""What can be commanded, and can fail, by plant."""
-
-DISTURBANCES = (("d1", "m/s^2"), ("d2", "rad/s"), ("d3", "rad/s^2"))
-"""Names and units of the disturbances, in the order of the plant's channels."""
-
 _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
-
-
-def unit_of(actuator: str) -> str:
-    """Unit of a deflection."""
-    return "N" if actuator == "thrust" else "rad"
 
 
 class Findings:
@@ -72,7 +60,7 @@ class Findings:
 
 
 def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
-    """The scheme, which must have the form that is asked for and fly a plant that there is."""
+    """The scheme, which must have the form that is asked for."""
     try:
         scheme = find_scheme(scenario.plan.scheme)
     except LookupError as error:
@@ -83,12 +71,19 @@ def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
         findings.refuse(
             f"form = {scenario.form!r}: scheme {scheme.name} has no such form; it has {', '.join(scheme.forms)}"
         )
-    if scheme.plant not in PLANT_ACTUATORS:
-        findings.refuse(
-            f"scheme = {scheme.name!r}: flies plant {scheme.plant!r}; there are {', '.join(PLANT_ACTUATORS)}"
-        )
     findings.stop_if_refused()
     return scheme
+
+
+def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:
+    """The plant, which must be one that the scheme can fly."""
+    name = plan.plant.model or scheme.plant
+    serving = [one for one in plants.names() if scheme.plant in plants.find(one).SERVES]
+    if name not in serving:
+        where = f"plant.model = {name!r}" if plan.plant.model else f"scheme = {scheme.name!r}"
+        findings.refuse(f"{where}: no plant that scheme {scheme.name} can fly; there are {', '.join(serving)}")
+        findings.stop_if_refused()
+    return plants.find(name)
 
 
 def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
@@ -204,17 +199,18 @@ def _require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Fi
             )
 
 
-def limits_of(plan: Plan, actuators: tuple[str, ...], findings: Findings) -> tuple[tuple[float, float], ...]:
-    """Travel in the order of ``ACTUATORS``; (0, 0) for what the plant lacks, which nothing else may speak of either."""
-    limits = []
-    lag = plan.plant.lag
-    for name in ACTUATORS:
+def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[float, float], ...]:
+    """Travel by slot; (0, 0) for what the plant lacks, which nothing else may speak of either."""
+    limits = [(0.0, 0.0)] * len(ACTUATORS)
+    actuators = plant.ACTUATORS
+    for name, slot in SLOT.items():
         given = getattr(plan.plant.limits, name)
-        if name in actuators and given is None:
-            findings.refuse(f"plant.limits.{name}: is missing")
-        if name not in actuators and (given is not None or getattr(lag, name) > 0.0):
+        if name in actuators:
+            if given is None:
+                findings.refuse(f"plant.limits.{name}: is missing")
+            limits[slot] = given or (0.0, 0.0)
+        elif given or getattr(plan.plant.lag, name) > 0.0 or getattr(plan.plant.rate_limits, name) < math.inf:
             findings.refuse(f"plant: has no {name}; its actuators are {', '.join(actuators)}")
-        limits.append(given or (0.0, 0.0))
     for n, fault in enumerate(plan.faults):
         if fault.actuator not in actuators:
             findings.refuse(
@@ -235,16 +231,35 @@ def limits_of(plan: Plan, actuators: tuple[str, ...], findings: Findings) -> tup
         for name in plan.plant.initial_actuators:
             if name not in actuators:
                 findings.refuse(f"plant.initial_actuators.{name}: the plant has no such actuator")
+    _check_names(plan, plant, findings)
     return tuple(limits)
 
 
-def level_trim(airframe: Airframe, V: float, where: str, findings: Findings, **disturbances: float) -> Trim:
-    """Level trim under disturbances d1, d2, d3; refused, and nan, where there is none."""
+def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
+    """Refuse initial states and disturbances that the plant does not have."""
+    starts = [("start", plan.start), *((f"start.uav.{uav}", start) for uav, start in plan.start.uav.items())]
+    for where, start in starts:
+        for name in Start.model_fields:
+            if name not in plant.START and getattr(start, name) is not None:
+                findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
+    channels = [name for name, _ in plant.DISTURBANCES]
+    for n, disturbance in enumerate(plan.disturbances):
+        for name in disturbance.values:
+            if name not in channels:
+                findings.refuse(
+                    f"disturbances.{n}.{name}: the plant has no such disturbance; it has {', '.join(channels)}"
+                )
+
+
+def level_trim(
+    plant: ModuleType, airframe: Any, V: float, where: str, findings: Findings, **disturbances: float
+) -> dict[str, float]:
+    """Level flight at ``V`` under disturbances, by name; refused, and nan, where there is none."""
     try:
-        return trim(airframe, V, **disturbances)
+        return dict(plant.level(airframe, V, **disturbances)._asdict())
     except TrimError as error:
         findings.refuse(f"{where}: {error}")
-        return Trim(math.nan, math.nan, math.nan)
+        return dict.fromkeys(("alpha", *plant.ACTUATORS), math.nan)
 
 
 def gains_of(scenario: Scenario, scheme: Scheme, findings: Findings) -> dict[int, Any]:
@@ -301,15 +316,7 @@ def check_scheme(
         leader_speed_varies=len(speeds) > 1 or any(p.speed_wave for p in profiles.values()),
         leader_acceleration=largest_acceleration(profiles, plan.duration),
         initial={
-            vehicle.uav: Reference(
-                x=vehicle.initial[1],
-                V=vehicle.initial[0],
-                V_dot=0.0,
-                z=vehicle.initial[2],
-                z_dot=vehicle.initial[0] * math.sin(vehicle.initial[3]),
-                z_ddot=0.0,
-                x_dot=vehicle.initial[0] * math.cos(vehicle.initial[3]),
-            )
+            vehicle.uav: _motion(plants.find(vehicle.plant).State(*vehicle.initial))
             for vehicle in vehicles
             if vehicle.uav in graph.followers
         },
@@ -331,7 +338,20 @@ def check_scheme(
             findings.warned.append(who + problem.text)
 
 
-def check_faults(plan: Plan, vehicles: list[VehicleSpec], findings: Findings) -> None:
+def _motion(state: Any) -> Reference:
+    """The motion of an aircraft in that state."""
+    return Reference(
+        x=state.x,
+        V=state.V,
+        V_dot=0.0,
+        z=state.z,
+        z_dot=state.V * math.sin(state.gamma),
+        z_ddot=0.0,
+        x_dot=state.V * math.cos(state.gamma),
+    )
+
+
+def check_faults(plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], findings: Findings) -> None:
     """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel."""
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
@@ -339,13 +359,14 @@ def check_faults(plan: Plan, vehicles: list[VehicleSpec], findings: Findings) ->
         V = plan.mission.V if plan.mission is not None else vehicle.initial[0]
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
         end = min(later, default=math.inf)
-        low, high = vehicle.limits[ACTUATORS.index(fault.actuator)]
+        low, high = vehicle.limits[SLOT[fault.actuator]]
         for at in sorted({fault.at} | {d.time for d in vehicle.disturbances if fault.at < d.time < end}):
             acting = {
                 name: sum(d.value for d in vehicle.disturbances if d.channel == channel and d.time <= at)
-                for channel, (name, _) in enumerate(DISTURBANCES)
+                for channel, (name, _) in enumerate(plant.DISTURBANCES)
             }
-            needed = getattr(level_trim(vehicle.airframe, V, f"faults.{n}", findings, **acting), fault.actuator)
+            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), V, f"faults.{n}", findings, **acting)
+            needed = steady.get(fault.actuator, 0.0)
             command = (needed - fault.bias) / fault.effectiveness if fault.effectiveness > 0.0 else math.inf
             if low < command < high or (fault.effectiveness == 0.0 and needed == fault.bias):
                 continue

@@ -1,6 +1,7 @@
 """A whole flight in one process, tick by tick: what the processes do, in the same order, through the same functions.
 
-A template, see `link.compiled`: the free name ``tick`` is the tick of the scheme that flies.
+A template, see `link.compiled`: the free names are ``tick``, the tick of the scheme, and ``cycle``, the flight
+of the plant. `simulate.loop_of` fills them in.
 """
 
 from __future__ import annotations
@@ -14,19 +15,23 @@ from ftcc.airside.autopilots import lead, sense, set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
 from ftcc.link.compiled import compiled, copy, fill
-from ftcc.sim.plant import DIVERGED, actuate, advance, truth
-from ftcc.sim.sensors import encode_state, measure
+from ftcc.sim.plant import DIVERGED, actuate
+from ftcc.sim.sensors import encode_state
 
 __all__ = ["HISTORY", "Ether", "Recording", "fly"]
 
-if "tick" not in globals():
-    raise ImportError("ftcc.groundside.flight_loop is a template: use ftcc.groundside.simulate")
+if "tick" not in globals() or "cycle" not in globals():
+    raise ImportError("ftcc.groundside.flight_loop is a template: use ftcc.groundside.simulate.loop_of")
 
 tick: Any = globals()["tick"]
+cycle: Any = globals()["cycle"]
 
 _announce = tick.announce
 _control = tick.control
 _refer = tick.refer
+_truth = cycle.truth
+_measure = cycle.measure
+_advance = cycle.advance
 
 HISTORY = 64
 """Records kept of each sender."""
@@ -152,8 +157,8 @@ def fly(
                 if n > 0:
                     _latch(fleet, autopilots, i, wire, buffer)
                 actuate(fleet, i, now / 1e6)
-            truth(fleet, i, now / 1e6, true[i])
-            measure(fleet, i, n, seed, true[i], seen)
+            _truth(fleet, i, now / 1e6, true[i])
+            _measure(fleet, i, n, seed, true[i], seen)
             if wire:
                 encode_state(seen, message)
                 # The vehicle reports the command in force as it received it.
@@ -199,7 +204,7 @@ def fly(
                 copy(fleet.command[i], recording.command[row, i])
                 copy(fleet.acting[i], recording.acting[row, i])
                 copy(autopilots.signals[i], recording.signals[row, i])
-            why = advance(fleet, i, now, period, step)
+            why = _advance(fleet, i, now, period, step)
             if why > 0 and recording.lost[i] == 0:
                 recording.lost[i] = why
                 recording.lost_us[i] = now + period

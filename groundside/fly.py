@@ -17,9 +17,10 @@ from ftcc.groundside.launcher import Outcome, Swarm
 from ftcc.groundside.registry import Control, Entry
 from ftcc.groundside.snapshot import Event
 from ftcc.groundside.station import Station
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import in_slots
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
+from ftcc.sim.plants import find
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
@@ -130,7 +131,8 @@ def fly(
     # The fork server must exist before this process opens anything.
     swarm.start()
     signals = [signal_.name for signal_ in mission.scheme.signals]
-    station = Station(ports.station, [spec.uav for spec in mission.vehicles], signals, folder / "telemetry.tlog")
+    uavs = [spec.uav for spec in mission.vehicles]
+    station = Station(ports.station, uavs, mission.plant, signals, folder / "telemetry.tlog")
     log = EventLog(folder / "events.jsonl")
     flight = _Flight(mission, swarm, station, None, log, say)
     control = None
@@ -224,7 +226,7 @@ def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> An
     from ftcc.groundside.dashboard import Dashboard
 
     follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
-    limits = dict(zip(ACTUATORS, follower.limits, strict=True))
+    limits = dict(zip(in_slots(find(mission.plant).ACTUATORS), follower.limits, strict=True))
     return Dashboard(
         title=mission.title,
         graph=mission.graph,

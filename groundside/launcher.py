@@ -38,8 +38,8 @@ _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
 """Exit codes after a stop that are nobody's death: also SIGTERM to the whole group, and a fork server gone first."""
 _LAST_WORDS = 12
 """Lines of a dead process's log that are reported."""
-_SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
-"""Tells the fork server which scheme to load, see `preload`."""
+_SCHEME_VARIABLE, _PLANT_VARIABLE = "FTCC_PRELOAD_SCHEME", "FTCC_PRELOAD_PLANT"
+"""Tell the fork server what to load, see `preload`."""
 
 
 def automatic_pack(uavs: int) -> int:
@@ -158,6 +158,7 @@ class Swarm:
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         os.environ[_SCHEME_VARIABLE] = self.mission.scheme.name
+        os.environ[_PLANT_VARIABLE] = self.mission.plant
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["ftcc.groundside.preload"])
         vehicles = {spec.uav: spec for spec in self.mission.vehicles}

@@ -6,7 +6,7 @@ import importlib.metadata
 import math
 import platform
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
 
 import tomli_w
 
@@ -15,9 +15,7 @@ from ftcc.airside.references.profiles import Command, Cosine, Profile, SpeedWave
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec, Neighbour
 from ftcc.groundside.checks import (
-    DISTURBANCES,
     IDEAL,
-    PLANT_ACTUATORS,
     Findings,
     check_delays,
     check_faults,
@@ -26,24 +24,23 @@ from ftcc.groundside.checks import (
     graph_of,
     level_trim,
     limits_of,
+    plant_of,
     scheme_of,
     timing_of,
-    unit_of,
 )
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
-from ftcc.groundside.schema import Claim, LeaderFields, Plan
-from ftcc.link.actuators import ACTUATORS, ELEVATOR, THRUST
+from ftcc.groundside.schema import AirframeSheet, Claim, Lag, LeaderFields, Plan, RateLimits
+from ftcc.link.actuators import ELEVATOR, SLOT, THRUST, in_slots, unit_of
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
-from ftcc.sim.airframe import Airframe
-from ftcc.sim.plant import TRUTH, Disturbance, Fault
+from ftcc.sim import plants
+from ftcc.sim.plant import TRUTH, Disturbance, Fault, Guards
 from ftcc.sim.spec import VehicleSpec
-from ftcc.sim.trim import Trim
 
 __all__ = ["Mission", "resolve"]
 
@@ -59,6 +56,8 @@ class Mission:
     case: str
     """Form and variants, the key of the claims' expected values."""
     scheme: Scheme
+    plant: str
+    """What the aircraft are, see ``sim.plants``."""
     timing: Timing
     wire: bool
     """States, commands and records pass through messages, and a command acts one sample late; False: ideal exchange."""
@@ -93,20 +92,20 @@ def resolve(scenario: Scenario) -> Mission:
     scheme = scheme_of(scenario, findings)
     wire = scenario.form != IDEAL
     timing = timing_of(plan, wire, findings)
-    limits = limits_of(plan, PLANT_ACTUATORS[scheme.plant], findings)
+    plant = plant_of(plan, scheme, findings)
+    limits = limits_of(plan, plant, findings)
     graph = graph_of(plan, scheme, findings)
     sheet = load_airframe(plan.airframe, scenario.file)
-    values = {name: float(getattr(sheet, name)) for name in Airframe._fields}
-    true = Airframe(**values | ({} if plan.plant.elevator_lift else {"CLde": 0.0}))
+    true = _airframe(plan, sheet, plant)
     findings.stop_if_refused()
 
     references = own_references(plan, scheme.plant, graph.followers, timing, findings)
     profiles = {uav: _profile(plan, uav, graph, findings) for uav in graph.leaders}
     findings.stop_if_refused()
-    vehicles = [_aircraft(plan, uav, scheme.plant, true, limits, findings) for uav in graph.followers]
-    vehicles += [_reference_point(plan, uav, true, limits, profiles[uav]) for uav in graph.leaders]
+    vehicles = [_aircraft(plan, uav, plant, true, limits, findings) for uav in graph.followers]
+    vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
     findings.stop_if_refused()
-    check_faults(plan, vehicles, findings)
+    check_faults(plan, plant, vehicles, findings)
 
     gains = gains_of(scenario, scheme, findings)
     if gains:
@@ -120,7 +119,7 @@ def resolve(scenario: Scenario) -> Mission:
 
     low, high = zip(*limits, strict=True)
     model = Model(
-        **values,
+        **{name: float(getattr(sheet, name)) for name in Model._fields if name in type(sheet).model_fields},
         thrust_min=low[THRUST],
         thrust_max=high[THRUST],
         elevator_min=low[ELEVATOR],
@@ -152,6 +151,7 @@ def resolve(scenario: Scenario) -> Mission:
         variants=scenario.variants,
         case=scenario.case,
         scheme=scheme,
+        plant=vehicles[0].plant,
         timing=timing,
         wire=wire,
         graph=graph,
@@ -160,45 +160,66 @@ def resolve(scenario: Scenario) -> Mission:
         claims=tuple(claim for claim in plan.claims if scenario.case in claim.expected),
         warnings=tuple(findings.warned),
         toml=_as_flown(scenario),
-        events=_planned(plan),
+        events=_planned(plan, plant),
     )
 
 
-def _initial_command(plan: Plan, level: Trim) -> tuple[float, ...]:
+def _airframe(plan: Plan, sheet: AirframeSheet, plant: ModuleType) -> tuple[float, ...]:
+    """The true parameters of the plant."""
+    values = {name: float(getattr(sheet, name)) for name in plant.Parameters._fields}
+    if not plan.plant.elevator_lift:
+        values["CLde"] = 0.0
+    return tuple(plant.Parameters(**values))
+
+
+def _initial_command(plan: Plan, plant: ModuleType, steady: dict[str, float]) -> tuple[float, ...]:
     given = plan.plant.initial_actuators
-    values = {"elevator": level.elevator, "thrust": level.thrust} | (given if isinstance(given, dict) else {})
-    return tuple(float(values.get(name, 0.0)) for name in ACTUATORS)
+    values = steady | (given if isinstance(given, dict) else {})
+    return tuple(float(values.get(name, 0.0)) for name in in_slots(plant.ACTUATORS))
+
+
+def _by_slot(fields: Lag | RateLimits, plant: ModuleType) -> tuple[float, ...]:
+    return tuple(float(getattr(fields, name)) for name in in_slots(plant.ACTUATORS))
 
 
 def _aircraft(
-    plan: Plan, uav: int, kind: str, airframe: Airframe, limits: tuple[tuple[float, float], ...], findings: Findings
+    plan: Plan,
+    uav: int,
+    plant: ModuleType,
+    airframe: tuple[float, ...],
+    limits: tuple[tuple[float, float], ...],
+    findings: Findings,
 ) -> VehicleSpec:
     own = plan.start.uav.get(uav)
-    start: dict[str, Any] = {}
-    for name in ("V", "x", "y", "z", "gamma", "theta", "q"):
+    start: dict[str, float] = {}
+    for name in plant.START:
         value = getattr(own, name) if own is not None else None
-        start[name] = value if value is not None else getattr(plan.start, name)
+        value = value if value is not None else getattr(plan.start, name)
+        if isinstance(value, float):
+            start[name] = value
     for name in ("V", "z"):
-        if start[name] is None:
+        if name not in start:
             findings.refuse(f"start.{name}: is missing")
             start[name] = 1.0
-    level = level_trim(airframe, start["V"], f"start of UAV {uav}", findings)
-    gamma = start["gamma"] or 0.0
-    theta = start["theta"] if isinstance(start["theta"], float) else level.alpha + gamma
+    true = plant.Parameters(*airframe)
+    steady = level_trim(plant, true, start["V"], f"start of UAV {uav}", findings)
     noise = plan.noise
+    channels = [name for name, _ in plant.DISTURBANCES]
     return VehicleSpec(
         uav=uav,
-        kind=kind,
+        kind="aircraft",
+        plant=plants.name_of(plant),
         airframe=airframe,
-        initial=(start["V"], start["x"] or 0.0, start["z"], gamma, theta, start["q"] or 0.0),
-        command=_initial_command(plan, level),
+        initial=tuple(plant.initial(start, steady)),
+        command=_initial_command(plan, plant, steady),
         limits=limits,
-        lag=tuple(float(getattr(plan.plant.lag, name)) for name in ACTUATORS),
+        lag=_by_slot(plan.plant.lag, plant),
+        rate=_by_slot(plan.plant.rate_limits, plant),
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=tuple(
             Fault(
                 f.at,
-                float(ACTUATORS.index(f.actuator)),
+                float(SLOT[f.actuator]),
                 f.effectiveness,
                 f.bias,
                 f.effectiveness_onset,
@@ -208,40 +229,47 @@ def _aircraft(
             if f.uav == uav
         ),
         disturbances=tuple(
-            Disturbance(d.at, float(channel), getattr(d, name), d.onset)
+            Disturbance(d.at, float(channels.index(name)), value, d.onset)
             for d in sorted(plan.disturbances, key=lambda d: d.at)
             if d.uavs is None or uav in d.uavs
-            for channel, (name, _) in enumerate(DISTURBANCES)
-            if getattr(d, name) != 0.0
+            for name, value in d.values.items()
         ),
         noise=tuple(float(getattr(noise, name, 0.0)) * noise.factor for name in TRUTH),
         guards=_guards(plan),
-        offset=start["y"] or 0.0,
+        offset=start.get("y", 0.0),
     )
 
 
-def _guards(plan: Plan) -> tuple[float, float, float]:
-    guards = plan.plant.guards
-    return (guards.least_airspeed, guards.flight_path_angle, guards.angle_of_attack)
+def _guards(plan: Plan) -> Guards:
+    return Guards(**{name: float(getattr(plan.plant.guards, name)) for name in Guards._fields})
 
 
 def _reference_point(
-    plan: Plan, uav: int, airframe: Airframe, limits: tuple[tuple[float, float], ...], profile: Profile
+    plan: Plan,
+    uav: int,
+    plant: ModuleType,
+    airframe: tuple[float, ...],
+    limits: tuple[tuple[float, float], ...],
+    profile: Profile,
 ) -> VehicleSpec:
+    y = plan.leaders[uav].y
     return VehicleSpec(
         uav=uav,
         kind="reference_point",
+        plant=plants.name_of(plant),
         airframe=airframe,
-        initial=(profile.V, profile.x, profile.z, 0.0, 0.0, 0.0),
-        command=(0.0,) * len(ACTUATORS),
+        initial=(0.0,) * len(plant.State._fields),
+        command=(0.0,) * len(limits),
         limits=limits,
-        lag=(0.0,) * len(ACTUATORS),
+        lag=(0.0,) * len(limits),
+        rate=(math.inf,) * len(limits),
         fault_before_lag=False,
         faults=(),
         disturbances=(),
         noise=(0.0,) * len(TRUTH),
         guards=_guards(plan),
-        offset=plan.leaders[uav].y,
+        offset=y,
+        target=(0.0, profile.x, y, profile.z, profile.V, 0.0, 0.0),
     )
 
 
@@ -278,7 +306,7 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
     return profile
 
 
-def _planned(plan: Plan) -> tuple[tuple[float, int | None, str], ...]:
+def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str], ...]:
     events: list[tuple[float, int | None, str]] = []
     for fault in plan.faults:
         unit = unit_of(fault.actuator)
@@ -287,8 +315,8 @@ def _planned(plan: Plan) -> tuple[tuple[float, int | None, str], ...]:
             text = f"{fault.actuator} repaired"
         events.append((fault.at, fault.uav, text))
     for disturbance in plan.disturbances:
-        given = [(name, unit, getattr(disturbance, name)) for name, unit in DISTURBANCES]
-        text = "disturbance " + ", ".join(f"{name} = {value:g} {unit}" for name, unit, value in given if value != 0.0)
+        units = dict(plant.DISTURBANCES)
+        text = "disturbance " + ", ".join(f"{name} = {v:g} {units[name]}" for name, v in disturbance.values.items())
         if disturbance.uavs is None:
             events.append((disturbance.at, None, text))
         else:

@@ -5,6 +5,7 @@ No socket, no thread, no Zenoh, Rerun or pyarrow here.
 
 from __future__ import annotations
 
+import math
 import os
 
 from ftcc.airside import process as autopilot_process
@@ -18,20 +19,25 @@ from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel
 from ftcc.link.timing import Timing
 from ftcc.sim import process as vehicle_process
-from ftcc.sim.airframe import Airframe
-from ftcc.sim.plant import TRUTH
+from ftcc.sim.plant import TRUTH, Guards
+from ftcc.sim.plants import cycle_of
+from ftcc.sim.plants import find as find_plant
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.spec import build as build_vehicles
 
-__all__ = ["SCHEME_VARIABLE", "load"]
+__all__ = ["PLANT_VARIABLE", "SCHEME_VARIABLE", "load"]
 
 SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
 """Environment variable that names the scheme to load."""
 
+PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
+"""Environment variable that names the plant to load."""
 
-def load(scheme: str) -> None:
-    """Load, or compile, everything that a swarm of ``scheme`` runs."""
+
+def load(scheme: str, plant: str) -> None:
+    """Load, or compile, everything that a swarm of ``scheme`` on ``plant`` runs."""
     law = find(scheme)
+    flown = find_plant(plant)
     nothing = AutopilotSpec(
         uav=1,
         role="follower",
@@ -50,23 +56,26 @@ def load(scheme: str) -> None:
             [
                 VehicleSpec(
                     uav=1,
-                    kind="longitudinal",
-                    airframe=Airframe(*(1.0,) * len(Airframe._fields)),
-                    initial=(1.0,) + (0.0,) * 5,
+                    kind="aircraft",
+                    plant=plant,
+                    airframe=(1.0,) * len(flown.Parameters._fields),
+                    initial=(1.0,) * len(flown.State._fields),
                     command=(0.0,) * len(ACTUATORS),
                     limits=((0.0, 0.0),) * len(ACTUATORS),
                     lag=(0.0,) * len(ACTUATORS),
+                    rate=(math.inf,) * len(ACTUATORS),
                     fault_before_lag=False,
                     faults=(),
                     disturbances=(),
                     noise=(0.0,) * len(TRUTH),
-                    guards=(0.0, 1.0, 1.0),
+                    guards=Guards(*(0.0,) * len(Guards._fields)),
                     offset=0.0,
                 )
             ]
-        )
+        ),
+        cycle_of(plant),
     )
 
 
 if SCHEME_VARIABLE in os.environ:
-    load(os.environ[SCHEME_VARIABLE])
+    load(os.environ[SCHEME_VARIABLE], os.environ[PLANT_VARIABLE])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LEADING", "Run", "RunError", "new_folder", "write_signals"]
 
-_SHOWN = ("thrust", "elevator", "aileron", "rudder")
+_SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
 LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
 """The first columns of ``signals.parquet``; the scheme's SIGNALS follow."""

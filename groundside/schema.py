@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -14,7 +15,7 @@ __all__ = ["AirframeSheet", "ChannelFields", "Claim", "LeaderFields", "LinkEvent
 Id = Annotated[int, Field(ge=1, le=200)]
 """MAVLink system id of a UAV."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-Actuator = Literal["thrust", "elevator", "aileron", "rudder"]
+Actuator = Literal["thrust", "elevator", "aileron", "rudder", "load_factor", "bank"]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 
@@ -169,15 +170,30 @@ class Lag(Strict):
     elevator: float = Field(0.0, ge=0.0)
     aileron: float = Field(0.0, ge=0.0)
     rudder: float = Field(0.0, ge=0.0)
+    load_factor: float = Field(0.0, ge=0.0)
+    bank: float = Field(0.0, ge=0.0)
+
+
+class RateLimits(Strict):
+    """Fastest motion of each actuator, N/s, rad/s and 1/s; default: no limit."""
+
+    thrust: Positive = math.inf
+    elevator: Positive = math.inf
+    aileron: Positive = math.inf
+    rudder: Positive = math.inf
+    load_factor: Positive = math.inf
+    bank: Positive = math.inf
 
 
 class Limits(Strict):
-    """Travel of each actuator: [lowest, highest], N and rad."""
+    """Travel of each actuator: [lowest, highest], N, rad, and load factor."""
 
     thrust: tuple[float, float] | None = None
     elevator: tuple[float, float] | None = None
     aileron: tuple[float, float] | None = None
     rudder: tuple[float, float] | None = None
+    load_factor: tuple[float, float] | None = None
+    bank: tuple[float, float] | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -194,14 +210,17 @@ class Guards(Strict):
     least_airspeed: float = Field(3.0, gt=0.0, description="m/s")
     flight_path_angle: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
     angle_of_attack: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
+    sideslip: float = Field(1.4, gt=0.0, lt=1.5708, description="rad")
 
 
 class Plant(Strict):
     """Options of the true aircraft."""
 
+    model: str | None = Field(None, description="which plant flies; default: the one that the scheme is made for")
     elevator_lift: bool = Field(True, description="false: CLde = 0")
     lag: Lag = Lag()
     limits: Limits
+    rate_limits: RateLimits = RateLimits()
     fault: Literal["after_lag", "before_lag"] = "after_lag"
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
         "trim", description="position, and command in force before the first one arrives; N, rad"
@@ -219,6 +238,12 @@ class Start(Strict):
     gamma: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, flight-path angle")
     theta: float | Literal["trim"] | None = Field(None, description="rad, pitch angle")
     q: float | None = Field(None, description="rad/s, pitch rate")
+    chi: float | None = Field(None, description="rad, course")
+    mu: float | None = Field(None, description="rad, bank about the velocity")
+    alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
+    beta: float | None = Field(None, gt=-1.4, lt=1.4, description="rad, sideslip")
+    p: float | None = Field(None, description="rad/s, roll rate")
+    r: float | None = Field(None, description="rad/s, yaw rate")
 
 
 class Starts(Start):
@@ -325,7 +350,7 @@ class AttitudeFields(Strict):
 
 
 class DisturbanceFields(Strict):
-    """Constant disturbances from ``at`` on."""
+    """Constant disturbances from ``at`` on, as far as the plant has them."""
 
     at: float = Field(ge=0.0, description="s")
     d1: float = Field(0.0, description="m/s^2, of the airspeed")
@@ -333,6 +358,12 @@ class DisturbanceFields(Strict):
     d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
     onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
     uavs: list[Id] | None = Field(None, description="default: all followers")
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The disturbances that are not zero, by name."""
+        given = {name: getattr(self, name) for name in type(self).model_fields if name not in ("at", "onset", "uavs")}
+        return {name: value for name, value in given.items() if value != 0.0}
 
 
 class FaultFields(Strict):
@@ -378,7 +409,9 @@ class Claim(Strict):
     unit: str = ""
     source: str
     expected: dict[str, float | list[float]]
-    tolerance: str | dict[str, str] = Field(description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; by case')
+    tolerance: str | dict[str, str] = Field(
+        description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; by case'
+    )
 
     @model_validator(mode="after")
     def _window_in_order(self) -> Self:

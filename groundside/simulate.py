@@ -15,13 +15,14 @@ from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.autopilots import link_events, tick_of
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_signals
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import ACTUATORS, in_slots
 from ftcc.link.compiled import instantiate
 from ftcc.link.recording import EventLog
 from ftcc.sim.plant import LOST, TRUTH
+from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import build as build_vehicles
 
-__all__ = ["Flight", "fly", "simulate"]
+__all__ = ["Flight", "fly", "loop_of", "simulate"]
 
 _CHUNKS = 100
 """A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
@@ -37,7 +38,7 @@ class Flight:
     truth: NDArray[np.float64]
     """(n, k, 13): recorded tick, UAV in the order of the mission, in the order of ``TRUTH``; nan once a UAV is lost."""
     command: NDArray[np.float64]
-    """(n, k, 4): in force, in the order of ``ACTUATORS``."""
+    """(n, k, 4): in force, by the actuators' slots."""
     acting: NDArray[np.float64]
     """(n, k, 4): what acts on the airframe."""
     signals: NDArray[np.float64]
@@ -60,8 +61,9 @@ class Flight:
     @property
     def _places(self) -> dict[str, tuple[NDArray[np.float64], int]]:
         places = {name: (self.truth, n) for n, name in enumerate(TRUTH)}
-        places |= {f"{name}_command": (self.command, n) for n, name in enumerate(ACTUATORS)}
-        places |= {name: (self.acting, n) for n, name in enumerate(ACTUATORS)}
+        actuators = in_slots(find(self.mission.plant).ACTUATORS)
+        places |= {f"{name}_command": (self.command, n) for n, name in enumerate(actuators)}
+        places |= {name: (self.acting, n) for n, name in enumerate(actuators)}
         return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
@@ -84,6 +86,11 @@ class Flight:
         for name, (values, n) in self._places.items():
             table[name] = values[:, order, n].ravel()[flown]
         return table
+
+
+def loop_of(scheme: str, plant: str) -> ModuleType:
+    """The compiled flight of a scheme on a plant, see `flight_loop`."""
+    return instantiate("ftcc.groundside.flight_loop", f"{scheme},{plant}", tick=tick_of(scheme), cycle=cycle_of(plant))
 
 
 def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
@@ -121,7 +128,7 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
         Called once when everything is compiled, before the first tick.
     """
     timing = mission.timing
-    loop = instantiate("ftcc.groundside.flight_loop", mission.scheme.name, tick=tick_of(mission.scheme.name))
+    loop = loop_of(mission.scheme.name, mission.plant)
     rows = timing.ticks // timing.record_every + 1
     arrays = _arrays(mission, loop, rows)
     constants = (
@@ -177,7 +184,7 @@ def simulate(
 
     # Arrow, and what the columns' descriptions pull in, are not needed before the flight.
     from ftcc.airside.process import columns as autopilot_columns
-    from ftcc.sim.process import COLUMNS
+    from ftcc.sim.process import columns as vehicle_columns
 
     events = EventLog(folder / "events.jsonl")
     for t, uav, text in mission.events:
@@ -189,5 +196,6 @@ def simulate(
     if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
         events.write(last, "interrupted", severity="warning")
     events.close()
-    write_signals(folder / "signals.parquet", (*COLUMNS, *autopilot_columns(mission.scheme.name)), flight.table())
+    columns = (*vehicle_columns(mission.plant), *autopilot_columns(mission.scheme.name))
+    write_signals(folder / "signals.parquet", columns, flight.table())
     return Run(folder)

@@ -12,10 +12,11 @@ from typing import Any
 
 from ftcc.airside.telemetry import LINK_FIELDS
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import in_slots
 from ftcc.link.mavlink import STATION, Endpoint
 from ftcc.sim.plant import TRUTH
-from ftcc.sim.process import TRUTH_ARRAY
+from ftcc.sim.plants import find
+from ftcc.sim.process import truth_array
 
 __all__ = ["Station"]
 
@@ -36,13 +37,17 @@ class _Heard:
 
 
 class Station:
-    """Receives telemetry on ``port``; writes it to ``log`` as a .tlog if given."""
+    """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given."""
 
-    def __init__(self, port: int, uavs: Iterable[int], signals: Sequence[str], log: Path | None = None) -> None:
+    def __init__(
+        self, port: int, uavs: Iterable[int], plant: str, signals: Sequence[str], log: Path | None = None
+    ) -> None:
         self._endpoint = Endpoint(STATION, 1, port)
         self._endpoint.enlarge_buffer()
         self._uavs = {uav: _Heard() for uav in uavs}
         self._signals = signals
+        self._truth = truth_array(plant)
+        self._actuators = in_slots(find(plant).ACTUATORS)
         self._log = log.open("ab") if log else None
         self._events: list[Event] = []
         self.t = 0.0
@@ -78,7 +83,7 @@ class Station:
             if name == "truth":
                 heard.t = message.time_usec / 1e6
                 self.t = max(self.t, heard.t)
-                heard.truth = dict(zip(TRUTH_ARRAY, message.data, strict=False))
+                heard.truth = dict(zip(self._truth, message.data, strict=False))
             elif name == "signals":
                 heard.signals = dict(zip(self._signals, message.data, strict=False))
             elif name == "links":
@@ -99,20 +104,20 @@ class Station:
 
     def snapshot(self) -> Snapshot:
         """The swarm as heard so far, and what happened since the last call."""
-        uavs = {uav: _state(heard) for uav, heard in self._uavs.items() if heard.truth}
+        uavs = {uav: _state(heard, self._actuators) for uav, heard in self._uavs.items() if heard.truth}
         events, self._events = tuple(self._events), []
         return Snapshot(self.t, uavs, events)
 
 
-def _state(heard: _Heard) -> UavState:
+def _state(heard: _Heard, actuators: Sequence[str]) -> UavState:
     truth = heard.truth
     return UavState(
         t=heard.t,
         truth={name: truth[name] for name in TRUTH},
-        command={name: truth[f"{name}_command"] for name in ACTUATORS},
-        acting={name: truth[name] for name in ACTUATORS},
-        effectiveness={name: truth[f"{name}_effectiveness"] for name in ACTUATORS},
-        bias={name: truth[f"{name}_bias"] for name in ACTUATORS},
+        command={name: truth[f"{name}_command"] for name in actuators},
+        acting={name: truth[name] for name in actuators},
+        effectiveness={name: truth[f"{name}_effectiveness"] for name in actuators},
+        bias={name: truth[f"{name}_bias"] for name in actuators},
         signals=heard.signals,
         links=heard.links,
         late=int(truth["late"]),

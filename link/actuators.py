@@ -2,16 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["ACTUATORS", "AILERON", "ELEVATOR", "RUDDER", "THRUST", "as_sent", "decode_command", "encode_command"]
+__all__ = [
+    "ACTUATORS",
+    "AILERON",
+    "ELEVATOR",
+    "RUDDER",
+    "SLOT",
+    "THRUST",
+    "as_sent",
+    "decode_command",
+    "encode_command",
+    "in_slots",
+    "unit_of",
+]
 
 ACTUATORS = ("aileron", "elevator", "rudder", "thrust")
 """As controls 0-3 of HIL_ACTUATOR_CONTROLS."""
 
 AILERON, ELEVATOR, RUDDER, THRUST = range(4)
+
+SLOT = {name: slot for slot, name in enumerate(ACTUATORS)} | {"bank": AILERON, "load_factor": ELEVATOR}
+"""Which control carries an actuator. A point mass is steered by bank and load factor instead of surfaces."""
+
+_UNITS = {"thrust": "N", "load_factor": "-"}
+
+
+def unit_of(actuator: str) -> str:
+    """Unit of a deflection."""
+    return _UNITS.get(actuator, "rad")
+
+
+def in_slots(used: Iterable[str]) -> tuple[str, ...]:
+    """Names of the four controls where the actuators ``used`` stand in theirs."""
+    names = list(ACTUATORS)
+    for name in used:
+        names[SLOT[name]] = name
+    return tuple(names)
 
 
 @compiled

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Airframe", "longitudinal_rates"]
+__all__ = ["Airframe", "Deflections", "longitudinal_rates"]
 
 
 class Airframe(NamedTuple):
@@ -38,6 +38,19 @@ class Airframe(NamedTuple):
     Cma: float
     Cmde: float
     Cmq: float
+
+
+class Deflections(NamedTuple):
+    """What acts on the airframe, in the order of ``ACTUATORS``."""
+
+    aileron: float
+    """rad."""
+    elevator: float
+    """rad."""
+    rudder: float
+    """rad."""
+    thrust: float
+    """N."""
 
 
 @compiled

@@ -1,13 +1,130 @@
-"""One tick of the vehicles of a process, compiled: what lies between two datagrams."""
+"""Flight of the vehicles of a process between two datagrams, compiled. A template, see `link.compiled`.
+
+The free name ``plant`` is the module of the equations of motion. `plants.cycle_of` gives this module with a plant
+filled in.
+"""
 
 from __future__ import annotations
 
-from ftcc.link.actuators import encode_command
-from ftcc.link.compiled import compiled
-from ftcc.sim.plant import actuate, advance, truth
-from ftcc.sim.sensors import encode_state, measure
+import math
+from typing import Any
 
-__all__ = ["fly_period", "report_state"]
+from ftcc.link.actuators import SLOT, encode_command
+from ftcc.link.compiled import compiled, fields, fill, store
+from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, actuate, disturbance, stroke
+from ftcc.sim.sensors import add_noise, encode_state
+
+__all__ = ["advance", "fly_period", "measure", "report_state", "truth"]
+
+if "plant" not in globals():
+    raise ImportError("ftcc.sim.cycle is a template: use ftcc.sim.plants.cycle_of(plant)")
+
+plant: Any = globals()["plant"]
+
+_State = plant.State
+_Inputs = plant.Inputs
+_Disturbances = plant.Disturbances
+_Parameters = plant.Parameters
+_rates = plant.rates
+_truth = plant.truth
+_complete = plant.complete
+_lost = plant.lost
+_SLOTS = tuple(SLOT[name] for name in plant.ACTUATORS)
+_CHANNELS = len(plant.DISTURBANCES)
+
+
+@compiled
+def _drive(fleet, i, time, step):
+    """Set what acts during a step whose middle is at ``time`` (s)."""
+    inputs = fleet.inputs[i]
+    for slot in _SLOTS:
+        inputs[0, slot], inputs[1, slot], inputs[2, slot] = stroke(fleet, i, slot, time, step)
+    for channel in range(_CHANNELS):
+        fleet.disturbed[i, channel] = disturbance(fleet, i, channel, time)
+
+
+@compiled
+def _step(fleet, i, h):
+    """One step of RK4 of ``h`` (s)."""
+    x, stages = fleet.state[i], fleet.stages[i]
+    stage, r1, r2, r3, r4 = stages[0], stages[1], stages[2], stages[3], stages[4]
+    parameters = fields(_Parameters, fleet.airframe[i])
+    d = fields(_Disturbances, fleet.disturbed[i])
+    begin, middle, end = (
+        fields(_Inputs, fleet.inputs[i, 0]),
+        fields(_Inputs, fleet.inputs[i, 1]),
+        fields(_Inputs, fleet.inputs[i, 2]),
+    )
+    k = 0.5 * h
+    size = x.shape[0]
+    store(_rates(fields(_State, x), begin, d, parameters), r1)
+    for j in range(size):
+        stage[j] = x[j] + k * r1[j]
+    store(_rates(fields(_State, stage), middle, d, parameters), r2)
+    for j in range(size):
+        stage[j] = x[j] + k * r2[j]
+    store(_rates(fields(_State, stage), middle, d, parameters), r3)
+    for j in range(size):
+        stage[j] = x[j] + h * r3[j]
+    store(_rates(fields(_State, stage), end, d, parameters), r4)
+    for j in range(size):
+        x[j] += h / 6.0 * (r1[j] + 2.0 * r2[j] + 2.0 * r3[j] + r4[j])
+
+
+@compiled
+def advance(fleet, i, start_us, period_us, step_us):
+    """Fly vehicle ``i`` for one period from ``start_us`` (us) with the command in force, in steps of ``step_us``.
+
+    Returns
+    -------
+    int
+        0, or why the vehicle is lost: a key of ``plant.LOST``.
+    """
+    if fleet.point[i] == 1:
+        return 0
+    guards = fields(Guards, fleet.guards[i])
+    h = step_us / 1e6
+    for n in range(period_us // step_us):
+        _drive(fleet, i, (start_us + n * step_us + step_us // 2) / 1e6, h)
+        _step(fleet, i, h)
+        why = _lost(fields(_State, fleet.state[i]), guards)
+        if why > 0:
+            return why
+    return 0
+
+
+@compiled
+def _point_truth(fleet, i, time, out):
+    """A `reference_point` moves at constant velocity from the stamp of its target on."""
+    target = fleet.target[i]
+    since = time - target[0]
+    vx, vy, vz = target[4], target[5], target[6]
+    ground = math.sqrt(vx * vx + vy * vy)
+    out[X] = target[1] + vx * since
+    out[Y] = target[2] + vy * since
+    out[Z] = target[3] + vz * since
+    out[V] = math.sqrt(ground * ground + vz * vz)
+    out[GAMMA] = math.atan2(vz, ground)
+    out[CHI] = math.atan2(vy, vx)
+    out[THETA] = out[GAMMA]
+
+
+@compiled
+def truth(fleet, i, time, out):
+    """Write the state of vehicle ``i`` at ``time`` (s) into ``out``, in the order of ``plant.TRUTH``."""
+    fill(out, 0.0)
+    if fleet.point[i] == 1:
+        _point_truth(fleet, i, time, out)
+    else:
+        _truth(fields(_State, fleet.state[i]), fleet.offset[i], out)
+        _complete(out)
+
+
+@compiled
+def measure(fleet, i, tick, seed, true, out):
+    """``true`` with the noise of vehicle ``i`` at this tick."""
+    if add_noise(true, fleet.noise[i], seed, fleet.uav[i], tick, out):
+        _complete(out)
 
 
 @compiled

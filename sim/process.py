@@ -10,10 +10,11 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Sequence
+from types import ModuleType
 
 import numpy as np
 
-from ftcc.link.actuators import ACTUATORS, decode_command
+from ftcc.link.actuators import decode_command, in_slots, unit_of
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
 from ftcc.link.mavlink import (
     LOOPBACK,
@@ -28,32 +29,36 @@ from ftcc.link.mavlink import (
 )
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
-from ftcc.sim.cycle import fly_period, report_state
 from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, effects
+from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import VehicleSpec, build
 
-__all__ = ["COLUMNS", "TRUTH_ARRAY", "Vehicles", "load_compiled", "run"]
+__all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
 
-_ACTUATOR_UNITS = {"thrust": "N"}
 
-COLUMNS = (
-    Column("t", "s", "simulated time"),
-    Column("uav", "-", "id"),
-    *(Column(name, UNITS[name], "altitude, up" if name == "z" else "") for name in TRUTH),
-    *(Column(f"{name}_command", _ACTUATOR_UNITS.get(name, "rad"), "command in force") for name in ACTUATORS),
-    *(Column(name, _ACTUATOR_UNITS.get(name, "rad"), "what acts on the airframe") for name in ACTUATORS),
-)
-"""Columns of a vehicle's part of the recording."""
+def columns(plant: str) -> tuple[Column, ...]:
+    """Columns of a vehicle's part of the recording."""
+    actuators = in_slots(find(plant).ACTUATORS)
+    return (
+        Column("t", "s", "simulated time"),
+        Column("uav", "-", "id"),
+        *(Column(name, UNITS[name], "altitude, up" if name == "z" else "") for name in TRUTH),
+        *(Column(f"{name}_command", unit_of(name), "command in force") for name in actuators),
+        *(Column(name, unit_of(name), "what acts on the airframe") for name in actuators),
+    )
 
-TRUTH_ARRAY = (
-    *TRUTH,
-    *(f"{name}_command" for name in ACTUATORS),
-    *ACTUATORS,
-    *(f"{name}_effectiveness" for name in ACTUATORS),
-    *(f"{name}_bias" for name in ACTUATORS),
-    "late",
-)
-"""Contents of the DEBUG_FLOAT_ARRAY "truth" that a vehicle sends to the station, and to nobody else."""
+
+def truth_array(plant: str) -> tuple[str, ...]:
+    """Contents of the DEBUG_FLOAT_ARRAY "truth" that a vehicle sends to the station, and to nobody else."""
+    actuators = in_slots(find(plant).ACTUATORS)
+    return (
+        *TRUTH,
+        *(f"{name}_command" for name in actuators),
+        *actuators,
+        *(f"{name}_effectiveness" for name in actuators),
+        *(f"{name}_bias" for name in actuators),
+        "late",
+    )
 
 
 def run(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
@@ -67,12 +72,12 @@ def run(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
         vehicles.close()
 
 
-def load_compiled(fleet: Fleet) -> None:
-    """Load, or compile, the functions of a tick before the flight."""
+def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
+    """Load, or compile, the functions of a tick, those of ``cycle_of`` the plant among them, before the flight."""
     k = len(fleet.uav)
     nobody, true, seen = np.zeros(k, np.int64), np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH))
-    report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
-    fly_period(fleet, nobody, 0, 1, 1, nobody)
+    cycle.report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
+    cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
     effects(fleet, 0, 0.0)
 
@@ -86,6 +91,7 @@ class Vehicles:
         self.timing = setting.timing
         self.gate = gate
         self.fleet = build(specs)
+        self.cycle = cycle_of(specs[0].plant)
         k = len(specs)
         self.alive = np.ones(k, np.int64)
         self.true = np.zeros((k, len(TRUTH)))
@@ -104,7 +110,7 @@ class Vehicles:
             for spec, port in zip(specs, ports, strict=True)
         ]
         self.station = [Endpoint(spec.uav, SIMULATOR, 0, (LOOPBACK, setting.station)) for spec in specs]
-        self.parts = [PartWriter(setting.folder / "parts" / f"{s.uav}-vehicle.arrows", COLUMNS) for s in specs]
+        self.parts = [PartWriter(setting.folder / "parts" / f"{s.uav}-vehicle.arrows", columns(s.plant)) for s in specs]
         self.telemetry = Telemetry(self.timing)
         self.stall = Stall()
         self.waiter = Waiter()
@@ -114,7 +120,7 @@ class Vehicles:
         self.patience.add(gate, gate.read)
         for i, pilot in enumerate(self.pilots):
             self.waiter.add(pilot, functools.partial(self.listen, i))
-        load_compiled(self.fleet)
+        load_compiled(self.fleet, self.cycle)
 
     def fly(self) -> None:
         """All ticks, or until everything is lost or the launcher stops the flight."""
@@ -214,7 +220,7 @@ class Vehicles:
 
     def send_state(self) -> None:
         """Measure and tell the autopilots."""
-        report_state(
+        self.cycle.report_state(
             self.fleet,
             self.alive,
             self.tick,
@@ -241,7 +247,7 @@ class Vehicles:
 
     def advance(self) -> None:
         """Fly one period; a vehicle that leaves its model is lost."""
-        fly_period(self.fleet, self.alive, self.now_us, self.timing.period_us, self.timing.step_us, self.why)
+        self.cycle.fly_period(self.fleet, self.alive, self.now_us, self.timing.period_us, self.timing.step_us, self.why)
         for i in range(len(self.specs)):
             if self.alive[i] and self.why[i]:
                 self.lose(i, int(self.why[i]), self.now_us + self.timing.period_us)

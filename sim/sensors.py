@@ -8,9 +8,9 @@ import numpy as np
 
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import NOISE, gaussian_pair, philox
-from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, THETA, TRUTH, P, Q, R, V, X, Y, Z
+from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, P, Q, R, V, X, Y, Z
 
-__all__ = ["STATE_MESSAGE", "encode_state", "measure"]
+__all__ = ["STATE_MESSAGE", "add_noise", "encode_state"]
 
 STATE_MESSAGE = ("q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed", "x", "y", "z", "vx", "vy", "vz")
 """The float32 fields of ATTITUDE_QUATERNION and LOCAL_POSITION_NED, in this order."""
@@ -19,23 +19,24 @@ _CHANNELS = len(TRUTH)
 
 
 @compiled
-def _add_noise(measured, deviation, seed, uav, tick):
-    """Add white noise to ``measured`` (order of `TRUTH`) with the given standard deviations, drawn for this tick.
+def add_noise(true, deviation, seed, uav, tick, out):
+    """``true`` (order of `TRUTH`) with white noise of the given standard deviations, drawn for this tick.
 
-    The angle of attack stays the difference of pitch and flight-path angle, as measured.
+    Returns whether there is any.
     """
+    copy(true, out)
     noisy = False
     for i in range(_CHANNELS):
         noisy = noisy or deviation[i] > 0.0
     if not noisy:
-        return
+        return False
     for pair in range((_CHANNELS + 1) // 2):
         u, v, _, _ = philox(seed, tick & 0xFFFFFFFF, uav, NOISE, pair)
         first, second = gaussian_pair(u, v)
-        measured[2 * pair] += deviation[2 * pair] * first
+        out[2 * pair] += deviation[2 * pair] * first
         if 2 * pair + 1 < _CHANNELS:
-            measured[2 * pair + 1] += deviation[2 * pair + 1] * second
-    measured[ALPHA] += measured[THETA] - measured[GAMMA] - measured[ALPHA]
+            out[2 * pair + 1] += deviation[2 * pair + 1] * second
+    return True
 
 
 @compiled
@@ -69,10 +70,3 @@ def encode_state(measured, out):
     out[12] = -measured[V] * math.sin(measured[GAMMA])
     for i in range(13):
         out[i] = float(np.float32(out[i]))
-
-
-@compiled
-def measure(fleet, i, tick, seed, true, out):
-    """``true`` with the noise of vehicle ``i`` at this tick."""
-    copy(true, out)
-    _add_noise(out, fleet.noise[i], seed, fleet.uav[i], tick)

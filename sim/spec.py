@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
-from ftcc.sim.airframe import Airframe
-from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet
+from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
+from ftcc.sim.plants import find
 
 __all__ = ["VehicleSpec", "build"]
 
@@ -22,24 +22,30 @@ class VehicleSpec:
 
     uav: int
     kind: str
-    """"longitudinal", or "reference_point": the kinematic stand-in for a leader's aircraft."""
-    airframe: Airframe
+    """"aircraft", or "reference_point": the kinematic stand-in for a leader's aircraft."""
+    plant: str
+    """What the aircraft of the swarm are, see `plants`."""
+    airframe: tuple[float, ...]
+    """The plant's ``Parameters``."""
     initial: tuple[float, ...]
-    """V, x, z, gamma, theta, q."""
+    """The plant's ``State``."""
     command: tuple[float, ...]
     """Command in force, and position of the actuators, before the first one arrives; order of ``ACTUATORS``."""
     limits: tuple[tuple[float, float], ...]
     lag: tuple[float, ...]
     """rad/s, 0 = none."""
+    rate: tuple[float, ...]
+    """Rate limit of each actuator, rad/s or N/s; inf = none."""
     fault_before_lag: bool
     faults: tuple[Fault, ...]
     disturbances: tuple[Disturbance, ...]
     noise: tuple[float, ...]
     """Standard deviation of each channel of ``TRUTH`` as measured."""
-    guards: tuple[float, float, float]
-    """Least airspeed m/s, largest abs(gamma), largest abs(alpha) rad."""
+    guards: Guards
     offset: float
-    """Lateral position, m."""
+    """Lateral position at the start, m."""
+    target: tuple[float, ...] = (0.0,) * 7
+    """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
 
     @property
     def travel(self) -> tuple[float, ...]:
@@ -57,12 +63,9 @@ def _padded(rows: Sequence[Sequence[tuple[float, ...]]], width: int) -> NDArray[
 
 
 def build(specs: Sequence[VehicleSpec]) -> Fleet:
-    """Arrays for ``specs`` before the first tick."""
+    """Arrays for ``specs``, which share one plant, before the first tick."""
     k = len(specs)
-    target = np.zeros((k, 7))
-    for i, spec in enumerate(specs):
-        V, x, z, gamma = spec.initial[:4]
-        target[i] = (0.0, x, spec.offset, z, V * math.cos(gamma), 0.0, V * math.sin(gamma))
+    plant = find(specs[0].plant)
     command = np.array([spec.command for spec in specs], np.float64)
     limits = np.array([spec.limits for spec in specs], np.float64)
     return Fleet(
@@ -72,15 +75,19 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         acting=np.zeros((k, len(ACTUATORS))),
         limits=limits,
         lag=np.array([spec.lag for spec in specs], np.float64),
+        rate=np.array([spec.rate for spec in specs], np.float64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
         faults=_padded([spec.faults for spec in specs], len(Fault._fields)),
         disturbances=_padded([spec.disturbances for spec in specs], len(Disturbance._fields)),
         guards=np.array([spec.guards for spec in specs], np.float64),
         airframe=np.array([spec.airframe for spec in specs], np.float64),
         offset=np.array([spec.offset for spec in specs], np.float64),
-        target=target,
+        target=np.array([spec.target for spec in specs], np.float64),
         point=np.array([spec.kind == "reference_point" for spec in specs], np.int64),
         noise=np.array([spec.noise for spec in specs], np.float64).reshape(k, len(TRUTH)),
         uav=np.array([spec.uav for spec in specs], np.int64),
         travel=np.array([spec.travel for spec in specs], np.float64),
+        inputs=np.zeros((k, 3, len(ACTUATORS))),
+        disturbed=np.zeros((k, len(plant.DISTURBANCES))),
+        stages=np.zeros((k, 5, len(plant.State._fields))),
     )

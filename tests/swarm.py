@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, build, link_events, tick_of
+from ftcc.airside.autopilots import Autopilots, build, link_events
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
+from ftcc.groundside.simulate import loop_of
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel, Inbox
-from ftcc.link.compiled import instantiate
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim.airframe import Airframe
-from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet
+from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.spec import build as build_fleet
 
@@ -58,21 +58,27 @@ SCENARIO_DISTURBANCES = tuple(Disturbance(50.0, channel, value, 0.0) for channel
 """Eq. (5.51)."""
 
 
+LEADER = (0.0, 0.0, 0.0, 1000.0, 30.0, 0.0, 0.0)
+"""First target of a `reference_point`."""
+
+
 def vehicle(uav: int = 1, **changes: Any) -> VehicleSpec:
     """A follower's aircraft in level trim at 30 m/s and 1000 m, without lag, faults, disturbances and noise."""
     standard: dict[str, Any] = {
         "uav": uav,
-        "kind": "longitudinal",
+        "kind": "aircraft",
+        "plant": "longitudinal",
         "airframe": AIRFRAME,
         "initial": (30.0, 0.0, 1000.0, 0.0, 0.0322, 0.0),
         "command": TRIM,
         "limits": LIMITS,
         "lag": (0.0,) * len(ACTUATORS),
+        "rate": (math.inf,) * len(ACTUATORS),
         "fault_before_lag": False,
         "faults": (),
         "disturbances": (),
         "noise": (0.0,) * len(TRUTH),
-        "guards": (3.0, 1.5, 1.5),
+        "guards": Guards(3.0, 1.5, 1.5, 1.4),
         "offset": 0.0,
     }
     return VehicleSpec(**standard | changes)
@@ -155,7 +161,7 @@ class Swarm:
                 noise=self.noise,
             )
             for uav in FOLLOWERS
-        ] + [vehicle(uav, kind="reference_point", initial=(30.0, 0.0, 1000.0, 0.0, 0.0, 0.0)) for uav in LEADERS]
+        ] + [vehicle(uav, kind="reference_point", target=LEADER) for uav in LEADERS]
         gains = tuple(self.scheme.gains(self.form, self.gains))
         specs = [
             autopilot(uav, gains=gains, channel=self.channel, link_events=self.link_events.get(uav, ()))
@@ -193,7 +199,7 @@ class Swarm:
     @property
     def loop(self) -> ModuleType:
         """The compiled flight loop of the scheme."""
-        return instantiate("ftcc.groundside.flight_loop", "containment", tick=tick_of("containment"))
+        return loop_of("containment", "longitudinal")
 
     def fly(self, first: int = 0, last: int | None = None) -> Swarm:
         """Fly the ticks first..last-1, by default all."""

@@ -14,7 +14,8 @@ from ftcc.link.gate import Ended, Gate, Go, Limit, Pace, Release
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, STATION, Endpoint, command_message, read_state
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
-from ftcc.sim.plant import TRUTH, advance
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.plants import cycle_of
 from ftcc.sim.process import Vehicles
 from ftcc.sim.spec import build
 from tests.swarm import TRIM, Swarm, timing, vehicle
@@ -71,7 +72,7 @@ def test_the_aircraft_flies_each_period_under_the_command_in_force(flight):
         for i in range(6):
             alone.state[0] = states[k, i]
             alone.command[0] = flight.recording.command[k, i]
-            assert advance(alone, 0, k * 10_000, 10_000, 1000) == 0
+            assert cycle_of("longitudinal").advance(alone, 0, k * 10_000, 10_000, 1000) == 0
             assert np.array_equal(alone.state[0], states[k + 1, i]), (k, i)
 
 
@@ -149,7 +150,7 @@ def test_a_vehicle_process_latches_at_tick_k_the_answer_to_state_k_minus_1(tmp_p
     for tick in range(ticks):
         if tick > 0:
             alone.command[0] = answer(tick - 1) * [0.0, 0.7, 0.0, 40.0]
-        advance(alone, 0, tick * 10_000, 10_000, 1000)
+        cycle_of("longitudinal").advance(alone, 0, tick * 10_000, 10_000, 1000)
         assert -states[tick + 1][9] == np.float32(alone.state[0, 2])
         assert states[tick + 1][5] == np.float32(alone.state[0, 5])
 

@@ -14,7 +14,7 @@ import pytest
 import ftcc.airside.schemes
 from ftcc.airside import schemes
 from ftcc.airside.scheme import Quantity, Scheme, load, quantities
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import SLOT
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 from ftcc.link.graph import Assumption
 
@@ -73,7 +73,7 @@ def test_what_a_scheme_declares_is_complete(name):
     assert isinstance(scheme.graph, Assumption)
     assert scheme.plant in ("longitudinal", "attitude", "position")
     assert {"monograph", "flight"} <= set(scheme.forms)
-    assert set(scheme.commands) <= set(ACTUATORS)
+    assert set(scheme.commands) <= set(SLOT)
     assert scheme.module.Output._fields[: len(scheme.commands)] == scheme.commands, "commands come first"
     for quantity in (*scheme.signals, *(q for row in scheme.shared.values() for q in row)):
         assert isinstance(quantity, Quantity)

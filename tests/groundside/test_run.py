@@ -18,7 +18,7 @@ from ftcc.groundside import Run, RunError, load, resolve
 from ftcc.groundside.run import new_folder
 from ftcc.groundside.simulate import fly, simulate
 from ftcc.link.recording import PartWriter, part_path
-from ftcc.sim.process import COLUMNS
+from ftcc.sim.process import columns as vehicle_columns
 
 TRUTH = ["x", "y", "z", "V", "gamma", "chi", "mu", "alpha", "beta", "theta", "p", "q", "r"]
 COMMANDED = ["thrust_command", "elevator_command", "aileron_command", "rudder_command"]
@@ -31,7 +31,8 @@ def write_parts(run: Run, folder: Path, keep: Callable[[int, str], int | None] =
     shutil.copy(run.path / "scenario.toml", folder)
     leaders = run.mission.graph.leaders
     for uav in run.uavs:
-        for role, columns in (("vehicle", COLUMNS), ("autopilot", autopilot_columns("containment"))):
+        both = {"vehicle": vehicle_columns("longitudinal"), "autopilot": autopilot_columns("containment")}
+        for role, columns in both.items():
             if role == "autopilot" and uav in leaders:
                 continue
             writer = PartWriter(part_path(folder, uav, role), columns)

@@ -12,9 +12,12 @@ from scipy.integrate import solve_ivp
 
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.sim.airframe import longitudinal_rates
-from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, actuate, advance, effects, truth
+from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, Guards, actuate, effects
+from ftcc.sim.plants import cycle_of
 from ftcc.sim.spec import VehicleSpec, build
-from tests.swarm import AIRFRAME, TRIM, vehicle
+from tests.swarm import AIRFRAME, LEADER, TRIM, vehicle
+
+advance, truth = cycle_of("longitudinal").advance, cycle_of("longitudinal").truth
 
 STEP = 1000
 LAG = (0.0, 20.0, 0.0, 20.0)
@@ -277,7 +280,7 @@ def test_disturbances_add_up():
     ids=["stall", "dive or climb", "tumble", "nan", "overflow"],
 )
 def test_an_aircraft_that_leaves_its_model_is_lost_with_the_reason(changes, command, reason):
-    fleet = build([vehicle(**{"guards": (10.0, 1.5, 1.5)} | changes)])
+    fleet = build([vehicle(**{"guards": Guards(10.0, 1.5, 1.5, 1.4)} | changes)])
     fleet.command[0] = command
     assert LOST[flown(fleet, 20_000)] == reason
 
@@ -313,7 +316,7 @@ def test_truth_is_the_state_in_the_order_of_its_names():
 
 
 def test_a_reference_point_moves_at_the_velocity_of_its_target_from_its_stamp_on():
-    fleet = build([vehicle(7, kind="reference_point", initial=(30.0, 0.0, 1000.0, 0.0, 0.0, 0.0))])
+    fleet = build([vehicle(7, kind="reference_point", target=LEADER)])
     out = np.zeros(len(TRUTH))
     truth(fleet, 0, 2.0, out)
     assert (out[0], out[2], out[3]) == (60.0, 1000.0, 30.0)

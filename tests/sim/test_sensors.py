@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.sim.plant import TRUTH
-from ftcc.sim.sensors import STATE_MESSAGE, encode_state, measure
+from ftcc.sim.plants import cycle_of
+from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 from ftcc.sim.spec import build
 from tests.swarm import noise, vehicle
 
@@ -114,7 +115,7 @@ def measured(deviations: tuple[float, ...], ticks: int, seed: int = 1, uav: int 
     true = np.array([100.0, -5.0, 1000.0, 30.0, 0.02, 0.1, 0.05, 0.03, 0.0, 0.05, 0.01, 0.02, 0.03])
     rows = np.zeros((ticks, len(TRUTH)))
     for tick in range(ticks):
-        measure(fleet, 0, tick, seed, true, rows[tick])
+        cycle_of("longitudinal").measure(fleet, 0, tick, seed, true, rows[tick])
     return rows - true
 
 

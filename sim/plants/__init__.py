@@ -1,0 +1,54 @@
+"""The plants: every file of this folder is a set of equations of motion, see ``sim/README.md``."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import pkgutil
+from types import ModuleType
+
+from ftcc.link.actuators import SLOT
+from ftcc.link.compiled import instantiate
+
+__all__ = ["cycle_of", "find", "name_of", "names"]
+
+_REQUIRED = ("State", "Inputs", "Disturbances", "Parameters", "ACTUATORS", "DISTURBANCES", "SERVES", "START")
+_FUNCTIONS = ("rates", "truth", "complete", "lost", "initial", "level")
+
+
+def names() -> list[str]:
+    """Names of all plants."""
+    return sorted(info.name for info in pkgutil.iter_modules(__path__))
+
+
+def name_of(plant: ModuleType) -> str:
+    """Name of a plant's module."""
+    return plant.__name__.removeprefix(f"{__name__}.")
+
+
+@functools.cache
+def find(name: str) -> ModuleType:
+    """The module of that plant, checked for completeness.
+
+    Raises
+    ------
+    LookupError
+        With the names that exist.
+    TypeError
+        If the file lacks something.
+    """
+    if name not in names():
+        raise LookupError(f"there is no plant {name!r}; there are {', '.join(names())}")
+    module = importlib.import_module(f"{__name__}.{name}")
+    missing = [wanted for wanted in _REQUIRED + _FUNCTIONS if not hasattr(module, wanted)]
+    if missing:
+        raise TypeError(f"plant {name} ({module.__name__}) lacks {', '.join(missing)}")
+    unknown = [actuator for actuator in module.ACTUATORS if actuator not in SLOT]
+    if unknown:
+        raise TypeError(f"plant {name}: actuators {', '.join(unknown)} have no slot in ftcc.link.actuators")
+    return module
+
+
+def cycle_of(plant: str) -> ModuleType:
+    """The compiled flight of vehicles of that plant, see `cycle`."""
+    return instantiate("ftcc.sim.cycle", plant, plant=find(plant))
