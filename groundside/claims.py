@@ -16,7 +16,9 @@ from ftcc.link.graph import Graph
 
 __all__ = ["Result", "Tolerance", "check_claims", "evaluate", "failed", "tolerance_of"]
 
-_TOLERANCE = re.compile(r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[0-9.eE+-]+))?\s*$")
+_TOLERANCE = re.compile(
+    r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[-+0-9.eE]+))?\s*$"
+)
 
 
 @dataclass(frozen=True)

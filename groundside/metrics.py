@@ -19,7 +19,17 @@ from numpy.typing import NDArray
 
 from ftcc.link.graph import Assumption, Graph, GraphError
 
-__all__ = ["DERIVED", "METRICS", "Metric", "Signals", "check_expression", "evaluated", "names_in", "uavs_in", "window_of"]
+__all__ = [
+    "DERIVED",
+    "METRICS",
+    "Metric",
+    "Signals",
+    "check_expression",
+    "evaluated",
+    "names_in",
+    "uavs_in",
+    "window_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -249,7 +259,7 @@ METRICS = {
     "time_until_settled": Metric(
         _time_until_settled,
         "max",
-        "time from the window's beginning until x stays within the threshold of its mean over the window's last fifth, s",
+        "time from the window's beginning until x stays within the threshold of the mean of the last fifth, s",
         True,
     ),
     "departure": Metric(
