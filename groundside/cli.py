@@ -71,18 +71,15 @@ def list_all() -> None:
 @app.command()
 def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", settings: Settings = None) -> None:
     """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
+    from ftcc.groundside.cases import cases_of, load_case
     from ftcc.groundside.mission import resolve
-    from ftcc.groundside.scenario import forms_and_variants
 
     first = load_scenario(scenario, form, variant, settings)
     cases = {first.case: first}
     if form is None and not variant and first.plan.flown is None:
-        forms, _ = forms_and_variants(first.source)
-        for case in [*forms, *(case for claim in first.plan.claims for case in claim.expected)]:
-            if case not in cases:
-                own_form, *variants = case.split("+")
-                cases[case] = load_scenario(scenario, own_form, ",".join(variants), settings)
+        cases |= {case: load_case(scenario, case, settings or []) for case in cases_of(first) if case != first.case}
     out = terminal()
+    warned: dict[str, list[str]] = {}
     for case, chosen in cases.items():
         mission = resolve(chosen)
         timing = mission.timing
@@ -95,7 +92,10 @@ def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", set
             soft_wrap=True,
         )
         for text in mission.warnings:
-            warn(f"{mission.name} {case}: {text}")
+            warned.setdefault(text, []).append(case)
+    for text, those in warned.items():
+        where = f" {', '.join(those)}" if len(those) < len(cases) else ""
+        warn(f"{first.name}{where}: {text}")
 
 
 @app.command()
@@ -130,6 +130,34 @@ def simulate(
         warn(f"UAV {uav}: {text}")
     interrupted = run.end < mission.timing.duration - mission.timing.period * mission.timing.record_every
     if run.lost or interrupted:
+        raise typer.Exit(1)
+
+
+@app.command()
+def verify(
+    scenario: ScenarioName,
+    cases: Annotated[
+        list[str] | None, typer.Option("--case", metavar="CASE", help="Only this one, such as flight+off; repeatable.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Show the claims that hold, too.")] = False,
+    settings: Settings = None,
+) -> None:
+    """Fly every case that a scenario makes claims for, in one process, unrecorded; exit code 1 if a claim fails."""
+    from ftcc.groundside.cases import cases_of, claims_in_flight, load_case
+    from ftcc.groundside.claims import failed
+    from ftcc.groundside.report import claims_table, summary
+
+    first = load_scenario(scenario, None, "", settings)
+    out = terminal()
+    failures = 0
+    for case in cases or cases_of(first):
+        flight, results = claims_in_flight(load_case(scenario, case, settings or []))
+        lost = "".join(f"; UAV {uav} lost at {t:g} s: {why}" for uav, (t, why) in flight.lost.items())
+        out.print(f"{case}: {summary(results)}{lost}", markup=False, highlight=False, soft_wrap=True)
+        failures += len(failed(results))
+        if shown := results if every else failed(results):
+            out.print(claims_table(shown))
+    if failures:
         raise typer.Exit(1)
 
 

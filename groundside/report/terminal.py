@@ -11,8 +11,9 @@ from ftcc.groundside.run import Run
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
-__all__ = ["as_json", "claims_of", "draw", "show", "show_claims", "summary"]
+__all__ = ["as_json", "claims_of", "claims_table", "draw", "show", "show_claims", "summary"]
 
 _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not flown[/]"}
 
@@ -51,6 +52,12 @@ def summary(results: list[Result]) -> str:
 
 
 def show_claims(console: Console, results: list[Result]) -> None:
+    """Print a table of claims, and how many hold."""
+    console.print(claims_table(results))
+    console.print(summary(results), highlight=False)
+
+
+def claims_table(results: list[Result]) -> Table:
     """A table of claims: what was expected, what was measured."""
     from rich.markup import escape
     from rich.table import Table
@@ -81,8 +88,7 @@ def show_claims(console: Console, results: list[Result]) -> None:
             _MARKS[result.ok] + (f" [dim]({escape(result.remark)})[/]" if result.remark and result.ok is False else ""),
             escape(claim.source),
         )
-    console.print(table)
-    console.print(summary(results), highlight=False)
+    return table
 
 
 def _ids(uavs: tuple[int, ...]) -> str:

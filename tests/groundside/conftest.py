@@ -10,31 +10,39 @@ from typing import Any
 import pytest
 import tomli_w
 
-from ftcc.groundside.claims import Result, evaluate
+from ftcc.groundside.cases import claims_in_flight, load_case
+from ftcc.groundside.claims import Result
 from ftcc.groundside.mission import Mission, resolve
 from ftcc.groundside.run import Run
 from ftcc.groundside.scenario import load, read, shipped
-from ftcc.groundside.simulate import fly, simulate
+from ftcc.groundside.simulate import simulate
 
 
-def mission_of(case: str, **options: Any) -> Mission:
-    """The mission of a case of the containment scenario, such as "flight+P+off"."""
-    form, *variants = case.split("+")
-    return resolve(load("containment", form=form, variants=variants, **options))
+def mission_of(case: str, scenario: str = "containment", **options: Any) -> Mission:
+    """The mission of a case of a scenario, such as "flight+P+off"."""
+    return resolve(load_case(scenario, case, **options))
 
 
 @pytest.fixture(scope="session")
-def results_of() -> Callable[[str], dict[str, Result]]:
-    """The claims of a case of the containment scenario after its flight, by name."""
+def results_of() -> Callable[..., dict[str, Result]]:
+    """The claims of a case of a scenario (default: containment) after its flight, by name."""
 
     @functools.cache
-    def flown(case: str) -> dict[str, Result]:
-        mission = mission_of(case)
-        flight = fly(mission)
+    def flown(case: str, scenario: str = "containment") -> dict[str, Result]:
+        flight, results = claims_in_flight(load_case(scenario, case))
         assert flight.lost == {}
-        return {result.claim.name: result for result in evaluate(flight, mission.claims, case, mission.graph)}
+        return {result.claim.name: result for result in results}
 
     return flown
+
+
+def failing(results: dict[str, Result]) -> dict[str, str]:
+    """What the claims that do not hold say."""
+    return {
+        name: f"{result.value} instead of {result.expected} ({result.tolerance})"
+        for name, result in results.items()
+        if not result.ok
+    }
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import pytest
 from ftcc.groundside.claims import Result
 from ftcc.groundside.scenario import load
 from ftcc.groundside.simulate import fly
-from tests.groundside.conftest import mission_of
+from tests.groundside.conftest import failing, mission_of
 
 PRINTED = ("monograph", "monograph+off")
 SAMPLED = ("flight+P", "flight+P+off", "flight", "flight+off")
@@ -70,12 +70,7 @@ CASES = sorted({case for claim in CLAIMS for case in claim.expected}, key=lambda
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_claim_of_every_case_holds(case: str, results_of: Callable[[str], dict[str, Result]]) -> None:
-    failing = {
-        name: f"{result.value} instead of {result.expected} ({result.tolerance})"
-        for name, result in results_of(case).items()
-        if not result.ok
-    }
-    assert failing == {}
+    assert failing(results_of(case)) == {}
 
 
 def claimed(source: str) -> list[tuple[str, ...]]:
