@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+import sys
 from collections.abc import Sequence
 from types import ModuleType
 from typing import NamedTuple
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.flight_path import Own, decode_state
+from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
@@ -30,10 +32,10 @@ from ftcc.airside.references.profiles import (
 )
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec
+from ftcc.airside.spec import AutopilotSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
-from ftcc.link.compiled import compiled, copy, instantiate, width
+from ftcc.link.compiled import compiled, copy, instantiate, refusal, uncompile, width
 from ftcc.link.timing import Timing
 
 __all__ = [
@@ -42,6 +44,7 @@ __all__ = [
     "build",
     "lead",
     "link_events",
+    "placeholder",
     "sense",
     "sense_all",
     "set_links",
@@ -123,9 +126,42 @@ class LinkEvents(NamedTuple):
 
 @functools.cache
 def tick_of(scheme: str) -> ModuleType:
-    """The compiled tick of a scheme, by name."""
+    """The tick of a scheme, by name.
+
+    It is compiled, or, where numba cannot compile the scheme, plain Python: then its ``REFUSAL`` says why.
+    """
     law = find(scheme)
-    return instantiate("ftcc.airside.tick", scheme, scheme=law.module, references=of_plant(law.plant))
+    tick = instantiate("ftcc.airside.tick", scheme, scheme=law.module, references=of_plant(law.plant))
+    autopilots, inbox = build([placeholder(scheme)], Timing(1, 1, 1, 1, 1, 1, 1))
+    because = refusal(tick.control, autopilots, inbox, 0, 0.01)
+    if because:
+        tick.__dict__["REFUSAL"] = f"scheme {scheme} flies as plain Python, slowly: numba cannot compile it ({because})"
+        uncompile([tick, *_with_its_package(law.module)])
+    return tick
+
+
+def _with_its_package(law: ModuleType) -> list[ModuleType]:
+    """A scheme's file, and, if it comes from another package than this one, what else of that is loaded."""
+    package, own = law.__name__.split(".")[0], __name__.split(".")[0]
+    if package == own:
+        return [law]
+    return [module for name, module in sys.modules.items() if name == package or name.startswith(f"{package}.")]
+
+
+def placeholder(scheme: str) -> AutopilotSpec:
+    """A follower that knows and hears nothing, to compile with."""
+    law = find(scheme)
+    return AutopilotSpec(
+        uav=1,
+        role="follower",
+        scheme=scheme,
+        gains=(0.0,) * len(law.gains_type._fields),
+        model=Model(*(0.0,) * len(Model._fields)),
+        travel=(0.0,) * len(ACTUATORS),
+        reference=OwnReference((0.0,) * len(of_plant(law.plant).Reference._fields)),
+        neighbours=(),
+        channel=Channel(),
+    )
 
 
 def _commands_of(specs: Sequence[AutopilotSpec]) -> NDArray[np.float64]:

@@ -52,6 +52,9 @@ def run(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     """Fly the autopilots of this process from the launcher's go to its release."""
     crew = Crew(specs, setting, gate)
     try:
+        if crew.law.REFUSAL and specs[0].uav == min(setting.ports):
+            # One process speaks for all.
+            gate.tell(Said("warning", crew.law.REFUSAL))
         crew.meet()
         gate.tell(Ready())
         gate.wait_until_go()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, NamedTuple, get_type_hints
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.references.longitudinal import Reference
+from ftcc.link.compiled import width
 from ftcc.link.graph import Assumption, Graph
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Quantity",
     "Reference",
     "Scheme",
+    "SchemeError",
     "quantities",
 ]
 
@@ -91,24 +93,55 @@ def quantities(record: Any) -> dict[str, Quantity]:
     return found
 
 
-_REQUIRED = ("Gains", "State", "Output", "SHARED", "SIGNALS", "GRAPH", "COMMANDS", "PLANT", "FORMS", "SWITCHES")
-_FUNCTIONS = ("start", "step", "share", "observe", "check")
+_REQUIRED = ("Gains", "State", "Output", "SHARED", "GRAPH", "COMMANDS", "start", "step", "share")
+_DEFAULTS: dict[str, Any] = {
+    "PLANT": "longitudinal",
+    "FORMS": {"flight": {}},
+    "SWITCHES": {},
+    "check": lambda gains, flight: [],
+}
+"""What a file that does not say otherwise means."""
+
+
+class SchemeError(TypeError):
+    """A file that is no scheme; the text says what it lacks."""
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme file, checked for completeness."""
+    """A scheme file, checked for completeness; what it leaves out has its default."""
 
     name: str
     module: ModuleType
 
     def __post_init__(self) -> None:
-        missing = [name for name in _REQUIRED + _FUNCTIONS if not hasattr(self.module, name)]
+        missing = [name for name in _REQUIRED if not hasattr(self.module, name)]
+        # Either both, or neither: then all states and outputs are shown.
+        if hasattr(self.module, "SIGNALS") != hasattr(self.module, "observe"):
+            missing += [name for name in ("SIGNALS", "observe") if not hasattr(self.module, name)]
         if missing:
-            raise TypeError(f"scheme {self.name} ({self.module.__name__}) lacks {', '.join(missing)}")
-        missing = [name for name in self.gains_type._fields if name not in quantities(self.gains_type)]
+            raise SchemeError(f"scheme {self.name} ({self.module.__name__}) lacks {', '.join(missing)}")
+        self._require_quantities("gains", self.gains_type, self.gains_type._fields)
+        if not hasattr(self.module, "SIGNALS"):
+            self._require_quantities("states", self.module.State, self.module.State._fields)
+            self._require_quantities("outputs", self.module.Output, self._shown)
+            if any(width(record) != len(record._fields) for record in (self.module.State, self.module.Output)):
+                raise SchemeError(
+                    f"scheme {self.name}: states or outputs hold vectors; say with SIGNALS what is recorded"
+                )
+
+    def _require_quantities(self, kind: str, record: Any, names: Sequence[str]) -> None:
+        missing = [name for name in names if name not in quantities(record)]
         if missing:
-            raise TypeError(f"scheme {self.name}: gains {', '.join(missing)} have no Quantity")
+            raise SchemeError(f"scheme {self.name}: {kind} {', '.join(missing)} have no Quantity")
+
+    @property
+    def _shown(self) -> tuple[str, ...]:
+        """The outputs that are no commands."""
+        return self.module.Output._fields[len(self.commands) :]  # type: ignore[no-any-return]
+
+    def _declared(self, name: str) -> Any:
+        return getattr(self.module, name, _DEFAULTS[name])
 
     @property
     def title(self) -> str:
@@ -124,7 +157,7 @@ class Scheme:
 
     @property
     def plant(self) -> str:
-        return self.module.PLANT  # type: ignore[no-any-return]
+        return self._declared("PLANT")  # type: ignore[no-any-return]
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -136,15 +169,19 @@ class Scheme:
 
     @property
     def signals(self) -> tuple[Quantity, ...]:
-        return self.module.SIGNALS  # type: ignore[no-any-return]
+        """``SIGNALS``; without it all states, then the outputs behind the commands."""
+        if hasattr(self.module, "SIGNALS"):
+            return self.module.SIGNALS  # type: ignore[no-any-return]
+        states, outputs = quantities(self.module.State), quantities(self.module.Output)
+        return (*states.values(), *(outputs[name] for name in self._shown))
 
     @property
     def forms(self) -> dict[str, dict[str, float]]:
-        return self.module.FORMS  # type: ignore[no-any-return]
+        return self._declared("FORMS")  # type: ignore[no-any-return]
 
     @property
     def switches(self) -> dict[str, dict[str, float]]:
-        return self.module.SWITCHES  # type: ignore[no-any-return]
+        return self._declared("SWITCHES")  # type: ignore[no-any-return]
 
     @property
     def shared_width(self) -> int:
@@ -152,7 +189,7 @@ class Scheme:
 
     @property
     def check(self) -> Callable[..., list[Problem]]:
-        return self.module.check  # type: ignore[no-any-return]
+        return self._declared("check")  # type: ignore[no-any-return]
 
     def gains(self, form: str, overrides: Mapping[str, float]) -> Any:
         """The gains of a form with overrides: published values, then the form's own, then ``overrides``.

@@ -15,7 +15,7 @@ from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import hear
-from ftcc.link.compiled import compiled, fields, store
+from ftcc.link.compiled import compiled, copy, fields, store, width
 
 __all__ = ["announce", "control", "hear_and_control", "refer"]
 
@@ -31,10 +31,13 @@ _Gains = scheme.Gains
 _start = scheme.start
 _step = scheme.step
 _share = scheme.share
-_observe = scheme.observe
 _Reference = references.Reference
 _refer = references.refer
+_STATES = width(_State)
 _COMMANDS = len(scheme.COMMANDS)
+
+REFUSAL = ""
+"""Why numba cannot compile the scheme, set by `autopilots.tick_of`; empty where it can."""
 
 _LARGEST = 1e30
 """Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
@@ -52,6 +55,21 @@ def _begin(autopilots, inbox, i, own, reference, gains):
         model = fields(Model, autopilots.model[i])
         store(_start(own, _heard(autopilots, inbox, i), reference, model, gains), autopilots.state[i])
         autopilots.started[i] = 1
+
+
+if hasattr(scheme, "observe"):
+    _observe = scheme.observe
+
+    @compiled
+    def _show(autopilots, i, before, own, reference, output, gains):
+        store(_observe(before, own, reference, output, gains), autopilots.signals[i])
+
+else:
+
+    @compiled
+    def _show(autopilots, i, before, own, reference, output, gains):
+        store(before, autopilots.signals[i])
+        copy(autopilots.output[i, _COMMANDS:], autopilots.signals[i, _STATES:])
 
 
 @compiled
@@ -93,7 +111,7 @@ def control(autopilots, inbox, i, dt):
             return False
     store(after, autopilots.state[i])
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
-    store(_observe(before, own, reference, output, gains), autopilots.signals[i])
+    _show(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
         autopilots.command[i, autopilots.actuator[n]] = shown[n]
     return True

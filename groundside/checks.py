@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from ftcc.airside.references.profiles import Profile, largest_acceleration, largest_climb
-from ftcc.airside.scheme import Flight, Problem, Reference, Scheme
+from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Start
@@ -63,7 +63,7 @@ def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
     """The scheme, which must have the form that is asked for."""
     try:
         scheme = find_scheme(scenario.plan.scheme)
-    except LookupError as error:
+    except (LookupError, SchemeError) as error:
         findings.refuse(f"scheme = {scenario.plan.scheme!r}: {error.args[0]}")
         findings.stop_if_refused()
         raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -201,6 +202,7 @@ cli_fly.register(app)
 
 def main() -> None:
     """Entry point: bad input ends with one message and exit code 2."""
+    warnings.showwarning = lambda message, *_, **__: warn(str(message))
     try:
         app()
     except UserError as error:

@@ -10,13 +10,8 @@ import os
 
 from ftcc.airside import process as autopilot_process
 from ftcc.airside.autopilots import build as build_autopilots
-from ftcc.airside.autopilots import link_events, tick_of
-from ftcc.airside.model import Model
-from ftcc.airside.references import of_plant
-from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec, OwnReference
+from ftcc.airside.autopilots import link_events, placeholder, tick_of
 from ftcc.link.actuators import ACTUATORS
-from ftcc.link.channel import Channel
 from ftcc.link.timing import Timing
 from ftcc.sim import process as vehicle_process
 from ftcc.sim.plant import TRUTH, Guards
@@ -36,19 +31,8 @@ PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
 
 def load(scheme: str, plant: str) -> None:
     """Load, or compile, everything that a swarm of ``scheme`` on ``plant`` runs."""
-    law = find(scheme)
     flown = find_plant(plant)
-    nothing = AutopilotSpec(
-        uav=1,
-        role="follower",
-        scheme=scheme,
-        gains=(0.0,) * len(law.gains_type._fields),
-        model=Model(*(0.0,) * len(Model._fields)),
-        travel=(0.0,) * len(ACTUATORS),
-        reference=OwnReference((0.0,) * len(of_plant(law.plant).Reference._fields)),
-        neighbours=(),
-        channel=Channel(),
-    )
+    nothing = placeholder(scheme)
     autopilots, inbox = build_autopilots([nothing], Timing(1, 1, 1, 1, 1, 1, 1))
     autopilot_process.load_compiled(autopilots, inbox, link_events([nothing]), tick_of(scheme))
     vehicle_process.load_compiled(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +17,22 @@ from ftcc.airside.autopilots import link_events, tick_of
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_signals
 from ftcc.link.actuators import ACTUATORS, in_slots
-from ftcc.link.compiled import instantiate
+from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.recording import EventLog
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import build as build_vehicles
 
-__all__ = ["Flight", "fly", "loop_of", "simulate"]
+__all__ = ["Flight", "PlainPython", "fly", "loop_of", "simulate"]
 
 _CHUNKS = 100
 """A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
 
 Progress = Callable[[float], None]
+
+
+class PlainPython(UserWarning):
+    """A scheme flies as plain Python, because numba cannot compile it."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +94,12 @@ class Flight:
 
 
 def loop_of(scheme: str, plant: str) -> ModuleType:
-    """The compiled flight of a scheme on a plant, see `flight_loop`."""
-    return instantiate("ftcc.groundside.flight_loop", f"{scheme},{plant}", tick=tick_of(scheme), cycle=cycle_of(plant))
+    """The flight of a scheme on a plant, see `flight_loop`: compiled, or plain Python if numba refuses the scheme."""
+    tick = tick_of(scheme)
+    loop = instantiate("ftcc.groundside.flight_loop", f"{scheme},{plant}", tick=tick, cycle=cycle_of(plant))
+    if tick.REFUSAL:
+        uncompile([loop])
+    return loop
 
 
 def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
@@ -129,6 +138,8 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     """
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
+    if loop.tick.REFUSAL:
+        warnings.warn(loop.tick.REFUSAL, PlainPython, stacklevel=2)
     rows = timing.ticks // timing.record_every + 1
     arrays = _arrays(mission, loop, rows)
     constants = (
@@ -190,6 +201,8 @@ def simulate(
     for t, uav, text in mission.events:
         if len(flight.t) and t <= flight.t[-1]:
             events.write(t, text, uav)
+    if refusal := tick_of(mission.scheme.name).REFUSAL:
+        events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():
         events.write(t, f"UAV {uav} lost: {why}", uav, "error")
     last = float(flight.t[-1]) if len(flight.t) else 0.0

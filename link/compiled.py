@@ -15,7 +15,7 @@ import math
 import os
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -33,7 +33,9 @@ __all__ = [
     "fields",
     "fill",
     "instantiate",
+    "refusal",
     "store",
+    "uncompile",
     "width",
 ]
 
@@ -79,6 +81,7 @@ os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from numba.core import types  # noqa: E402
+from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import overload  # noqa: E402
 from numba.np.unsafe.ndarray import to_fixed_tuple  # noqa: E402
@@ -93,6 +96,34 @@ def compiled(function: F) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
     return numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(function)  # type: ignore[no-any-return]
+
+
+def refusal(function: Any, *arguments: Any) -> str:
+    """Compile ``function`` for the types of ``arguments``, without a call: why numba refuses, or "" if it does not."""
+    if isinstance(function, Dispatcher):
+        try:
+            function.compile(tuple(numba.typeof(argument) for argument in arguments))
+        except Exception as error:  # numba's own kinds of error are not all that it raises
+            return _reason(str(error)) or repr(error)
+    return ""
+
+
+def _reason(text: str) -> str:
+    """What matters of numba's message: the innermost problem, and the first place outside numba that it names."""
+    lines = [line.strip() for line in text.splitlines()]
+    said = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))]
+    places = [line for line in lines if line.startswith("File ") and "/numba/" not in line]
+    shown = said[:1] + [line for line in said[1:3] if line.startswith(">>>")] + places[:1]
+    return "; ".join(line.rstrip(":") for line in shown)
+
+
+def uncompile(modules: Sequence[ModuleType]) -> None:
+    """Turn the compiled functions of ``modules``, wherever these use them, back into plain Python."""
+    homes = {__name__, *(module.__name__ for module in modules)}
+    for module in modules:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, Dispatcher) and value.py_func.__module__ in homes:
+                setattr(module, name, value.py_func)
 
 
 Vector = tuple[float, float, float]

@@ -27,7 +27,7 @@ _ORDER, _SLOWEST, _FASTEST, _PER_DECADE, _STEP, _COUNT, _DIRECT = range(COLUMNS)
 @compiled
 def number_of_poles(slowest, fastest, per_decade):  # type: ignore[no-untyped-def]
     """Poles of an operator for the band ``slowest`` to ``fastest`` (rad/s), with the one for all slower ones."""
-    return int(math.floor(per_decade * math.log10(fastest / slowest) + 0.5)) + 2
+    return math.floor(per_decade * math.log10(fastest / slowest) + 0.5) + 2
 
 
 @compiled

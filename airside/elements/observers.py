@@ -46,8 +46,8 @@ def reference_system_step(model, gap, value, derivative, rate, explained, gain, 
     """Sliding-mode estimate of the part of an acceleration that a model does not explain: chapter 9 [R].
 
     The reference system model' = explained + gain gap, gap = rate - model, makes gap' = d - gain gap; a Levant
-    differentiator of the gap with ``bound`` > abs(gap'') then gives d exactly after a finite time. Steps itself over the
-    last ``h`` seconds, in which ``explained`` is the mean of the modelled acceleration.
+    differentiator of the gap with ``bound`` > abs(gap'') then gives d exactly after a finite time. Steps itself over
+    the last ``h`` seconds, in which ``explained`` is the mean of the modelled acceleration.
 
     Returns
     -------

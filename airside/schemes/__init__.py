@@ -32,6 +32,8 @@ def find(name: str) -> Scheme:
     ------
     LookupError
         With the names that exist.
+    SchemeError
+        With what its file lacks.
     """
     if name not in _modules():
         raise LookupError(f"there is no scheme {name!r}; there are {', '.join(names())}")

@@ -129,33 +129,37 @@ def file_like(containment: Scheme, **changes: object) -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "Gains",
-        "State",
-        "Output",
-        "SHARED",
-        "SIGNALS",
-        "GRAPH",
-        "COMMANDS",
-        "PLANT",
-        "FORMS",
-        "SWITCHES",
-        "start",
-        "step",
-        "share",
-        "observe",
-        "check",
-    ],
-)
+REQUIRED = ["Gains", "State", "Output", "SHARED", "GRAPH", "COMMANDS", "start", "step", "share"]
+
+
+@pytest.mark.parametrize("name", [*REQUIRED, "SIGNALS", "observe"])
 def test_a_file_that_lacks_something_is_refused_with_what_it_lacks(containment, name):
     with pytest.raises(TypeError, match=rf"scheme mine \(a_users_scheme\) lacks {name}$"):
         Scheme("mine", file_like(containment, **{name: None}))
 
 
+def test_what_a_file_may_leave_out_has_its_default(containment):
+    scheme = Scheme("mine", file_like(containment, PLANT=None, FORMS=None, SWITCHES=None, check=None))
+    assert (scheme.plant, scheme.forms, scheme.switches) == ("longitudinal", {"flight": {}}, {})
+    assert scheme.check(scheme.gains("flight", {}), None) == []
+
+
+class ShownOutput(NamedTuple):
+    thrust: float
+    elevator: float
+    S1: Annotated[float, Quantity("S1", "m")]
+
+
+def test_without_signals_all_states_are_recorded_and_all_outputs_that_are_no_commands(containment):
+    scheme = Scheme("mine", file_like(containment, SIGNALS=None, observe=None, Output=ShownOutput))
+    states = [quantity.name for quantity in quantities(containment.module.State).values()]
+    assert [signal.name for signal in scheme.signals] == [*states, "S1"]
+    with pytest.raises(TypeError, match=r"outputs zhat_rate, S1, .*thrust_wanted have no Quantity"):
+        Scheme("mine", file_like(containment, SIGNALS=None, observe=None))
+
+
 def test_everything_that_is_missing_is_said_at_once():
-    with pytest.raises(TypeError, match=r"lacks Gains, State, Output, SHARED.*start, step"):
+    with pytest.raises(TypeError, match=r"lacks Gains, State, Output, SHARED.*start, step, share"):
         load("empty", "ftcc.airside.model")
 
 

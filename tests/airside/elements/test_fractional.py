@@ -79,8 +79,13 @@ def test_reference_poles():
 
 @pytest.mark.parametrize(
     ("band", "order", "of_one", "of_ramp"),
-    [(WIDE, 0.2, 3.3e-4, 6.9e-3), (WIDE, 0.5, 6.7e-4, 5.3e-3), (NARROW, 0.2, 1.4e-3, 2.2e-2), (NARROW, 0.5, 3.4e-3, 2.4e-2)],
-)  # fmt: skip
+    [
+        (WIDE, 0.2, 3.3e-4, 6.9e-3),
+        (WIDE, 0.5, 6.7e-4, 5.3e-3),
+        (NARROW, 0.2, 1.4e-3, 2.2e-2),
+        (NARROW, 0.5, 3.4e-3, 2.4e-2),
+    ],
+)
 def test_error_of_the_integral_is_as_tabulated(band, order, of_one, of_ramp):
     """Reference table 5.1."""
     assert worst(integral(order, band, ONE), order, 0) == pytest.approx(of_one, rel=0.05)

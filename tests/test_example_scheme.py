@@ -1,0 +1,132 @@
+"""A scheme from a package of its own flies, and shows itself everywhere, without any other change."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from ftcc.groundside import Run, ScenarioError, load, resolve
+from ftcc.groundside.dashboard.plots import tracking_errors
+from ftcc.groundside.mission import Mission
+from ftcc.groundside.simulate import PlainPython, simulate
+from tests.guests import EXAMPLE, forget_schemes, install
+from tests.sitl.conftest import same_flight
+
+SCENARIO = EXAMPLE / "consensus.toml"
+SECONDS = 3.0
+
+# The same law, written as numba cannot compile it.
+PLAIN = (
+    (EXAMPLE / "altitude_consensus.py")
+    .read_text()
+    .replace(
+        "S1, S2 = own.z - s.z_ref, own.V - reference.V",
+        'errors = {"z": own.z - s.z_ref, "V": own.V - reference.V}\n    S1, S2 = errors["z"], errors["V"]',
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder on the path with the example's package in it, and with the law that numba refuses."""
+    target = tmp_path_factory.mktemp("site")
+    install(EXAMPLE, target, {"plain_consensus": PLAIN})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(target))
+        forget_schemes()
+        yield target
+    forget_schemes()
+
+
+def mission(scheme: str, duration: float | None = None) -> Mission:
+    return resolve(load(SCENARIO, settings=[f"scheme={scheme}"], duration=duration))
+
+
+@pytest.fixture(scope="module")
+def flown(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The first seconds of the example in one process."""
+    return simulate(mission("altitude_consensus", SECONDS), tmp_path_factory.mktemp("runs") / "example")
+
+
+def ftcc(installed: Path, runtime: Path, *arguments: str) -> str:
+    """The output of a command in an environment in which the package is installed."""
+    finished = subprocess.run(
+        [sys.executable, "-m", "ftcc.groundside.cli", *arguments],
+        env={**os.environ, "PYTHONPATH": str(installed), "FTCC_RUNTIME_DIR": str(runtime), "COLUMNS": "300"},
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    return finished.stdout + finished.stderr
+
+
+def test_what_it_claims_holds(installed: Path, tmp_path: Path) -> None:
+    run = simulate(mission("altitude_consensus"), tmp_path / "run")
+    from ftcc.groundside.report import claims_of
+
+    assert {result.claim.name: result.ok for result in claims_of(run)} == {
+        "altitude tracking": True,
+        "altitude behind the leader at the end": True,
+    }
+
+
+def test_it_is_recorded_and_plotted_as_its_file_declares(flown: Run) -> None:
+    columns = flown.columns
+    assert [columns[name].unit for name in ("z_ref", "theta_0", "elevator_0", "thrust_0", "S1", "S2")] == [
+        "m", "rad", "rad", "N", "m", "m/s",
+    ]  # fmt: skip
+    assert columns["S1"].meaning == "altitude tracking error"
+    assert [signal.name for signal in tracking_errors(flown.mission.scheme.signals)] == ["S1", "S2"]
+    z, z_ref, S1 = (flown.column(name, 2) for name in ("z", "z_ref", "S1"))
+    assert abs(z - z_ref - S1).max() < 1e-3, "errors of the law are those of the aircraft, but for float32"
+
+
+def test_it_is_listed_and_flies_as_processes_bit_for_bit(installed: Path, flown: Run, tmp_path: Path) -> None:
+    assert "Altitude consensus behind a leader" in ftcc(installed, tmp_path, "list")
+    options = ("--speed", "max", "--viewer", "none", "--duration", f"{SECONDS:g}")
+    ftcc(installed, tmp_path, "fly", str(SCENARIO), *options, "--out", str(tmp_path / "run"))
+    assert same_flight(tmp_path / "run", flown.path)
+
+
+def test_a_scheme_that_numba_refuses_flies_as_plain_python_with_the_same_bits(
+    installed: Path, flown: Run, tmp_path: Path
+) -> None:
+    refusal = "scheme plain_consensus flies as plain Python, slowly: numba cannot compile it"
+    with pytest.warns(PlainPython, match=rf"{refusal} \(.*plain_consensus\.py") as warned:
+        run = simulate(mission("plain_consensus", SECONDS), tmp_path / "simulated")
+    assert len(warned) == 1
+    assert same_flight(run.path, flown.path)
+
+    options = ("--set", "scheme=plain_consensus", "--speed", "max", "--viewer", "none", "--duration", f"{SECONDS:g}")
+    output = ftcc(installed, tmp_path, "fly", str(SCENARIO), *options, "--out", str(tmp_path / "flown"))
+    assert output.count(refusal) == 1, "said once, not by every process"
+    assert same_flight(tmp_path / "flown", flown.path)
+
+
+def test_the_walk_through_quotes_the_example_as_it_is() -> None:
+    guide = (Path(__file__).parents[1] / "airside" / "schemes" / "README.md").read_text()
+    quotes = re.findall(r"```(?:python|toml)\n(.*?)```", guide, re.DOTALL)
+    assert len(quotes) >= 5
+    sources = [(EXAMPLE / name).read_text() for name in ("altitude_consensus.py", "pyproject.toml", "consensus.toml")]
+    for quote in quotes:
+        assert any(quote in source for source in sources), quote
+
+
+def test_a_package_whose_scheme_is_none_is_told_what_it_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(EXAMPLE, tmp_path, {"half_a_scheme": '"""Half a scheme."""\n'})
+    monkeypatch.syspath_prepend(str(tmp_path))
+    forget_schemes()
+    try:
+        with pytest.raises(ScenarioError, match=r"scheme half_a_scheme .*lacks Gains, State, Output"):
+            mission("half_a_scheme")
+    finally:
+        monkeypatch.undo()
+        forget_schemes()
