@@ -1,8 +1,9 @@
 """Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
 
 An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
-same times. Beside the recorded columns there are, for followers of a graph with leaders, ``z_d`` (the altitude that its
-hull weights give it) and ``hull_distance`` (how far it is above or below all leaders).
+same times. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d`` and ``z_d`` (the
+position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below all leaders) and
+``hull_distance_x`` (how far ahead of or behind them).
 """
 
 from __future__ import annotations
@@ -33,7 +34,16 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-DERIVED = {"z_d": "altitude of the containment point, m", "hull_distance": "distance outside the leaders' altitudes, m"}
+_PLACES = {"x_d": "x", "z_d": "z"}
+_DISTANCES = {"hull_distance_x": "x", "hull_distance": "z"}
+"""Derived columns, and the recorded one of the leaders that they are made of."""
+
+DERIVED = {
+    "x_d": "forward position of the containment point, m",
+    "z_d": "altitude of the containment point, m",
+    "hull_distance_x": "distance outside the leaders' forward positions, m",
+    "hull_distance": "distance outside the leaders' altitudes, m",
+}
 
 _CLOSE = 1e-9
 """Rounding of times, s."""
@@ -173,24 +183,25 @@ def _at(t: Array, times: Array, values: Array) -> Array:
 def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
     if name not in DERIVED:
         return signals.column(name, uav)
-    altitudes = _leaders_altitudes(signals, graph, signals.column("t", uav))
-    if name == "hull_distance":
-        z = signals.column("z", uav)
-        outside: Array = np.maximum(np.maximum(altitudes.min(axis=0) - z, z - altitudes.max(axis=0)), 0.0)
+    along = (_PLACES | _DISTANCES)[name]
+    leaders = _leaders_columns(along, signals, graph, signals.column("t", uav))
+    if name in _DISTANCES:
+        own = signals.column(along, uav)
+        outside: Array = np.maximum(np.maximum(leaders.min(axis=0) - own, own - leaders.max(axis=0)), 0.0)
         return outside
     if uav not in graph.followers:
-        return np.full(altitudes.shape[1], np.nan)
-    place: Array = graph.hull_weights[graph.followers.index(uav)] @ altitudes
+        return np.full(leaders.shape[1], np.nan)
+    place: Array = graph.hull_weights[graph.followers.index(uav)] @ leaders
     return place
 
 
-def _leaders_altitudes(signals: Signals, graph: Graph, t: Array) -> Array:
-    """Altitudes of the leaders at times ``t``, shape (leaders, n); nan where a leader was not recorded."""
+def _leaders_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Array:
+    """A column of the leaders at times ``t``, shape (leaders, n); nan where a leader was not recorded."""
     try:
         graph.require(Assumption.LEADERS_REACH_ALL)
     except GraphError as error:
-        raise ValueError(f"z_d and hull_distance need leaders: {error}") from None
-    return np.array([_at(t, signals.column("t", uav), signals.column("z", uav)) for uav in graph.leaders])
+        raise ValueError(f"{', '.join(DERIVED)} need leaders: {error}") from None
+    return np.array([_at(t, signals.column("t", uav), signals.column(name, uav)) for uav in graph.leaders])
 
 
 def window_of(t: Array, window: tuple[float, float]) -> slice:

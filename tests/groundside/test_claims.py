@@ -75,6 +75,12 @@ def test_the_containment_point_is_the_hull_weights_combination_of_the_leaders(kn
     assert evaluated("hull_distance", known, GRAPH, 2)[[0, 99, 100]].tolist() == [5.0, 5.0, 0.0]
 
 
+def test_the_same_holds_for_forward_positions(known: Known) -> None:
+    known.data |= {("x", 7): 30.0 * T, ("x", 8): 30.0 * T + 100.0, ("x", 2): 30.0 * T - 20.0 * (T < 1.0)}
+    np.testing.assert_allclose(evaluated("x_d", known, GRAPH, 1), 30.0 * T + 25.0)
+    assert evaluated("hull_distance_x", known, GRAPH, 2)[[0, 99, 100]].tolist() == [20.0, 20.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("metric", "threshold", "value"),
     [
