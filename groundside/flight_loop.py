@@ -15,7 +15,8 @@ from ftcc.airside.autopilots import lead, sense, set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
 from ftcc.link.compiled import compiled, copy, fill
-from ftcc.sim.plant import DIVERGED, actuate
+from ftcc.sim.obstacles import watch
+from ftcc.sim.plant import DIVERGED, X, Z, actuate
 from ftcc.sim.sensors import encode_state
 
 __all__ = ["HISTORY", "Ether", "Recording", "fly"]
@@ -158,6 +159,7 @@ def fly(
                     _latch(fleet, autopilots, i, wire, buffer)
                 actuate(fleet, i, now / 1e6)
             _truth(fleet, i, now / 1e6, true[i])
+            watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[i, X], true[i, Z])
             _measure(fleet, i, n, seed, true[i], seen)
             if wire:
                 encode_state(seen, message)

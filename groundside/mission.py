@@ -5,13 +5,13 @@ from __future__ import annotations
 import importlib.metadata
 import math
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 
 import tomli_w
 
 from ftcc.airside.model import Model
-from ftcc.airside.references.profiles import Command, Cosine, Profile, SpeedWave, Trigger, trigger_rows
+from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec, Neighbour
 from ftcc.groundside.checks import (
@@ -29,16 +29,18 @@ from ftcc.groundside.checks import (
     timing_of,
 )
 from ftcc.groundside.claims import check_claims
+from ftcc.groundside.leaders import profiles_of
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
-from ftcc.groundside.schema import AirframeSheet, Claim, Lag, LeaderFields, Plan, RateLimits
+from ftcc.groundside.schema import AirframeSheet, Claim, Lag, Plan, RateLimits
 from ftcc.link.actuators import ELEVATOR, SLOT, THRUST, in_slots, unit_of
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
+from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.plant import TRUTH, Disturbance, Fault, Guards
 from ftcc.sim.spec import VehicleSpec
 
@@ -62,6 +64,7 @@ class Mission:
     wire: bool
     """States, commands and records pass through messages, and a command acts one sample late; False: ideal exchange."""
     graph: Graph
+    obstacles: tuple[Obstacle, ...]
     vehicles: tuple[VehicleSpec, ...]
     """Followers, then leaders."""
     autopilots: tuple[AutopilotSpec, ...]
@@ -100,7 +103,8 @@ def resolve(scenario: Scenario) -> Mission:
     findings.stop_if_refused()
 
     references = own_references(plan, scheme.plant, graph.followers, timing, findings)
-    profiles = {uav: _profile(plan, uav, graph, findings) for uav in graph.leaders}
+    obstacles = tuple(Obstacle(*fields.x, fields.top) for fields in plan.obstacles)
+    profiles = profiles_of(plan, graph, findings)
     findings.stop_if_refused()
     vehicles = [_aircraft(plan, uav, plant, true, limits, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
@@ -113,7 +117,7 @@ def resolve(scenario: Scenario) -> Mission:
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, graph, channel, findings.refuse)
     check_delays(plan, timing, findings)
-    names = (*LEADING, *(quantity.name for quantity in scheme.signals))
+    names = (*LEADING, *(["clearance"] if obstacles else []), *(quantity.name for quantity in scheme.signals))
     findings.refused += check_claims(plan.claims, graph, names)
     findings.stop_if_refused()
 
@@ -155,7 +159,8 @@ def resolve(scenario: Scenario) -> Mission:
         timing=timing,
         wire=wire,
         graph=graph,
-        vehicles=tuple(vehicles),
+        obstacles=obstacles,
+        vehicles=tuple(replace(vehicle, obstacles=obstacles) for vehicle in vehicles),
         autopilots=autopilots,
         claims=tuple(claim for claim in plan.claims if scenario.case in claim.expected),
         warnings=tuple(findings.warned),
@@ -271,39 +276,6 @@ def _reference_point(
         offset=y,
         target=(0.0, profile.x, y, profile.z, profile.V, 0.0, 0.0),
     )
-
-
-def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
-    fields: LeaderFields = plan.leaders[uav]
-    commands, triggers = [], []
-    altitude, speed = fields.z, fields.V
-    for command in fields.commands:
-        altitude = altitude if command.altitude is None else command.altitude
-        speed = speed if command.speed is None else command.speed
-        if command.at is not None:
-            commands.append(Command(command.at, altitude, speed))
-        elif command.x is not None:
-            triggers.append(Trigger(uav if command.uav is None else command.uav, command.x, altitude, speed))
-    if commands != sorted(commands, key=lambda c: c.at):
-        findings.refuse(f"leaders.{uav}.commands: must stand in the order of time")
-    profile = Profile(
-        x=fields.x,
-        z=fields.z,
-        V=fields.V,
-        commands=tuple(commands),
-        altitude_filter=(fields.altitude_filter.frequency, fields.altitude_filter.damping),
-        speed_filter=(fields.speed_filter.frequency, fields.speed_filter.damping),
-        cosine=Cosine(**fields.cosine.model_dump()) if fields.cosine else None,
-        triggers=tuple(triggers),
-        forward=fields.forward,
-        speed_wave=SpeedWave(**fields.speed_wave.model_dump()) if fields.speed_wave else None,
-        climb_limit=math.inf if fields.climb_limit is None else fields.climb_limit,
-    )
-    try:
-        trigger_rows(profile, uav, graph.senders(uav))
-    except ValueError as error:
-        findings.refuse(f"leaders.{uav}.commands: {error}")
-    return profile
 
 
 def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str], ...]:

@@ -322,6 +322,11 @@ class LeaderFields(Strict):
     speed_filter: Filter = Filter(frequency=0.05, damping=0.95)
     cosine: CosineFields | None = None
     speed_wave: WaveFields | None = None
+    over_obstacles: list[float] = Field(
+        [],
+        description="m, altitude at which to pass each obstacle, from its detection until all leaders are past it; "
+        "elsewhere that of the start",
+    )
     forward: bool = Field(False, description="speeds are forward speeds instead of airspeeds")
     climb_limit: float | None = Field(None, gt=0.0, description="m/s, largest climb rate of the profile")
 
@@ -347,6 +352,19 @@ class AttitudeFields(Strict):
 
     filter: Filter = Filter(frequency=0.9, damping=0.3)
     commands: list[AttitudeCommandFields] = Field(min_length=1)
+
+
+class ObstacleFields(Strict):
+    """A zone along the flight that is to be passed above."""
+
+    x: tuple[float, float] = Field(description="m, from and to this forward position")
+    top: float = Field(description="m, altitude")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.x[0] < self.x[1]:
+            raise ValueError(f"x = {list(self.x)}: must end behind where it begins")
+        return self
 
 
 class DisturbanceFields(Strict):
@@ -448,6 +466,8 @@ class Plan(Strict):
     mission: MissionFields | None = None
     attitude: AttitudeFields | None = None
     leaders: dict[Id, LeaderFields] = {}
+    obstacles: list[ObstacleFields] = []
+    detection_range: float | None = Field(None, gt=0.0, description="m, at which the leaders detect an obstacle ahead")
     gains: GainFields = GainFields()
     switches: dict[str, bool] = {}
     disturbances: list[DisturbanceFields] = []

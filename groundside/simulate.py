@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +19,9 @@ from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_signals
 from ftcc.link.actuators import ACTUATORS, in_slots
 from ftcc.link.compiled import instantiate, uncompile
+from ftcc.link.happenings import drained
 from ftcc.link.recording import EventLog
+from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import build as build_vehicles
@@ -52,6 +55,8 @@ class Flight:
     """(n,): s."""
     lost: dict[int, tuple[float, str]]
     """When (s) and why a UAV was lost."""
+    events: tuple[tuple[float, int, str, str], ...] = ()
+    """What happened otherwise: time s, UAV, severity, text."""
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -69,7 +74,17 @@ class Flight:
         actuators = in_slots(find(self.mission.plant).ACTUATORS)
         places |= {f"{name}_command": (self.command, n) for n, name in enumerate(actuators)}
         places |= {name: (self.acting, n) for n, name in enumerate(actuators)}
+        if self.mission.obstacles:
+            places["clearance"] = (self.clearance, 0)
         return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
+
+    @functools.cached_property
+    def clearance(self) -> NDArray[np.float64]:
+        """(n, k, 1): height above the obstacle below, m."""
+        zones = zones_of(self.mission.obstacles)
+        x, z = self.truth[:, :, TRUTH.index("x")], self.truth[:, :, TRUTH.index("z")]
+        heights = [clearance(zones, *place) for place in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)]
+        return np.array(heights).reshape(*x.shape, 1)
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
         """A column of one UAV in order of time, as far as it flew."""
@@ -158,9 +173,11 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     chunk = max(1, -(-end // _CHUNKS))
     flown = 0
     interrupted = False
+    events: list[tuple[float, int, str, str]] = []
     while flown < end and not interrupted:
         try:
             loop.fly(*arrays, *constants, flown, min(end, flown + chunk))
+            events += _happened(mission, arrays[0])
             flown = min(end, flown + chunk)
             if progress is not None:
                 progress((flown - 1) * timing.period)
@@ -181,7 +198,14 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
             for i, uav in enumerate(mission.uavs)
             if recording.lost[i] > 0
         },
+        events=tuple(events),
     )
+
+
+def _happened(mission: Mission, fleet: Any) -> list[tuple[float, int, str, str]]:
+    """What the vehicles have noted: time s, UAV, severity, text."""
+    told = [(at / 1e6, mission.uavs[i], number) for at, i, _, number in drained(fleet.happenings)]
+    return [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in told]
 
 
 def simulate(
@@ -205,10 +229,12 @@ def simulate(
         events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():
         events.write(t, f"UAV {uav} lost: {why}", uav, "error")
+    for t, uav, severity, text in flight.events:
+        events.write(t, text, uav, severity)
     last = float(flight.t[-1]) if len(flight.t) else 0.0
     if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
         events.write(last, "interrupted", severity="warning")
     events.close()
-    columns = (*vehicle_columns(mission.plant), *autopilot_columns(mission.scheme.name))
+    columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
     write_signals(folder / "signals.parquet", columns, flight.table())
     return Run(folder)

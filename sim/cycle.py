@@ -11,6 +11,7 @@ from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, store
+from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, actuate, disturbance, stroke
 from ftcc.sim.sensors import add_noise, encode_state
 
@@ -134,6 +135,7 @@ def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, control
         if alive[i] == 1:
             actuate(fleet, i, now_us / 1e6)
             truth(fleet, i, now_us / 1e6, true[i])
+            watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[i, X], true[i, Z])
             measure(fleet, i, tick, seed, true[i], seen)
             encode_state(seen, messages[i])
             encode_command(fleet.command[i], fleet.travel[i], controls[i])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.compiled import compiled
+from ftcc.link.happenings import Happenings
 
 __all__ = [
     "DIVERGED",
@@ -134,6 +135,12 @@ class Fleet(NamedTuple):
     """(k,): ids."""
     travel: NDArray[np.float64]
     """(k, 4): full deflection of each actuator."""
+    zones: NDArray[np.float64]
+    """(n, 3): the obstacles, see `obstacles.Obstacle`."""
+    entered: NDArray[np.int64]
+    """(k, n): 1 once a vehicle has entered the zone."""
+    happenings: Happenings
+    """What is to be told; the kinds are those of `obstacles`."""
     inputs: NDArray[np.float64]
     """(k, 3, 4): room for what acts at the beginning, middle and end of an integration step."""
     disturbed: NDArray[np.float64]

@@ -16,6 +16,7 @@ import numpy as np
 
 from ftcc.link.actuators import decode_command, in_slots, unit_of
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
+from ftcc.link.happenings import drained
 from ftcc.link.mavlink import (
     LOOPBACK,
     SIMULATOR,
@@ -29,15 +30,19 @@ from ftcc.link.mavlink import (
 )
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
-from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, effects
+from ftcc.sim.obstacles import clearance, entered_text
+from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z, effects
 from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import VehicleSpec, build
 
 __all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
 
 
-def columns(plant: str) -> tuple[Column, ...]:
-    """Columns of a vehicle's part of the recording."""
+_CLEARANCE = Column("clearance", "m", "height above the obstacle below, or above z = 0 where there is none")
+
+
+def columns(plant: str, obstacles: bool = False) -> tuple[Column, ...]:
+    """Columns of a vehicle's part of the recording; clearance where there are obstacles."""
     actuators = in_slots(find(plant).ACTUATORS)
     return (
         Column("t", "s", "simulated time"),
@@ -45,6 +50,7 @@ def columns(plant: str) -> tuple[Column, ...]:
         *(Column(name, UNITS[name], "altitude, up" if name == "z" else "") for name in TRUTH),
         *(Column(f"{name}_command", unit_of(name), "command in force") for name in actuators),
         *(Column(name, unit_of(name), "what acts on the airframe") for name in actuators),
+        *([_CLEARANCE] if obstacles else []),
     )
 
 
@@ -80,6 +86,7 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
     effects(fleet, 0, 0.0)
+    clearance(fleet.zones, 0.0, 0.0)
 
 
 class Vehicles:
@@ -110,7 +117,8 @@ class Vehicles:
             for spec, port in zip(specs, ports, strict=True)
         ]
         self.station = [Endpoint(spec.uav, SIMULATOR, 0, (LOOPBACK, setting.station)) for spec in specs]
-        self.parts = [PartWriter(setting.folder / "parts" / f"{s.uav}-vehicle.arrows", columns(s.plant)) for s in specs]
+        parts = setting.folder / "parts"
+        self.parts = [PartWriter(parts / f"{s.uav}-vehicle.arrows", columns(s.plant, bool(s.obstacles))) for s in specs]
         self.telemetry = Telemetry(self.timing)
         self.stall = Stall()
         self.waiter = Waiter()
@@ -237,13 +245,19 @@ class Vehicles:
                 pilot.send(*state_messages(self.now_us, self.messages[i], told))
 
     def record(self) -> None:
-        """Append a row of truth to each part."""
+        """Append a row of truth to each part; tell what happened."""
         if self.tick % self.timing.record_every == 0:
             for i, spec in enumerate(self.specs):
                 if self.alive[i]:
+                    true = self.true[i]
+                    over = (clearance(self.fleet.zones, true[X], true[Z]),) if spec.obstacles else ()
                     self.parts[i].row(
-                        (self.now_us / 1e6, spec.uav, *self.true[i], *self.fleet.command[i], *self.fleet.acting[i])
+                        (self.now_us / 1e6, spec.uav, *true, *self.fleet.command[i], *self.fleet.acting[i], *over)
                     )
+        if self.fleet.happenings.used[0]:
+            for at_us, i, _, number in drained(self.fleet.happenings):
+                uav = self.specs[i].uav
+                self.gate.tell(Said("warning", entered_text(uav, number), uav, at_us))
 
     def advance(self) -> None:
         """Fly one period; a vehicle that leaves its model is lost."""

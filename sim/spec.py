@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
+from ftcc.link.happenings import new_happenings
+from ftcc.sim.obstacles import Obstacle, zones_of
 from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
 from ftcc.sim.plants import find
 
@@ -46,6 +48,8 @@ class VehicleSpec:
     """Lateral position at the start, m."""
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
+    obstacles: tuple[Obstacle, ...] = ()
+    """The same for all vehicles."""
 
     @property
     def travel(self) -> tuple[float, ...]:
@@ -87,6 +91,9 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         noise=np.array([spec.noise for spec in specs], np.float64).reshape(k, len(TRUTH)),
         uav=np.array([spec.uav for spec in specs], np.int64),
         travel=np.array([spec.travel for spec in specs], np.float64),
+        zones=zones_of(specs[0].obstacles),
+        entered=np.zeros((k, len(specs[0].obstacles)), np.int64),
+        happenings=new_happenings(),
         inputs=np.zeros((k, 3, len(ACTUATORS))),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
         stages=np.zeros((k, 5, len(plant.State._fields))),

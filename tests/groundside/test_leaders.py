@@ -1,0 +1,96 @@
+"""Leaders climb over the obstacles that one of them detects; who flies into one is told."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+from ftcc.airside.references.profiles import Trigger
+from ftcc.groundside.mission import Mission, resolve
+from ftcc.groundside.scenario import ScenarioError, load, read, shipped
+from ftcc.groundside.simulate import simulate
+
+
+def mission(**options: Any) -> Mission:
+    return resolve(load("finite_time_containment", **options))
+
+
+def triggers(flown: Mission, uav: int) -> tuple[Trigger, ...]:
+    (profile,) = (spec.profile for spec in flown.autopilots if spec.uav == uav)
+    assert profile is not None
+    return profile.triggers
+
+
+def test_detection_turns_obstacles_into_the_published_commands_by_position() -> None:
+    """Detected by the foremost leader 1000 m ahead; left behind when the hindmost has passed (chapter 6)."""
+    flown = mission()
+    watched = [(6, 1500.0), (5, 4500.0), (6, 8000.0), (5, 12000.0)]
+    for uav, altitudes in ((5, (580.0, 500.0, 600.0, 500.0)), (6, (480.0, 400.0, 500.0, 400.0))):
+        assert [(t.uav, t.x) for t in triggers(flown, uav)] == watched
+        assert [t.altitude for t in triggers(flown, uav)] == list(altitudes)
+        assert {t.speed for t in triggers(flown, uav)} == {30.0}
+
+
+def test_an_obstacle_detected_over_another_one_does_not_let_the_leaders_sink_between() -> None:
+    settings = ["obstacles=[{x=[2500.0, 4500.0], top=430.0}, {x=[5000.0, 7000.0], top=450.0}]"]
+    found = triggers(mission(settings=settings), 5)
+    assert [(t.uav, t.x, t.altitude) for t in found] == [
+        (6, 1500.0, 580.0),
+        (6, 4000.0, 600.0),
+        (5, 4500.0, 600.0),
+        (5, 7000.0, 500.0),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["leaders.5.over_obstacles=[580.0]"], "leaders.5.over_obstacles: 1 altitudes for 2 obstacles"),
+        (["leaders.5.commands=[{x=10.0, altitude=510.0}]"], "leaders.5: takes either over_obstacles or commands"),
+        (["leaders.5.V=25.0"], "must fly at one speed"),
+        (["obstacles.0.x=[4500.0, 2500.0]"], "obstacles.0"),
+        (["detection_range=0.0"], "detection_range = 0.0"),
+    ],
+)
+def test_what_makes_no_reaction_is_refused(settings: list[str], words: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        mission(settings=settings)
+    assert words in str(caught.value)
+
+
+def test_leaders_that_react_need_a_detection_range_and_each_other(tmp_path: Path) -> None:
+    document = read(shipped()["finite_time_containment"])
+    del document["detection_range"]
+    path = tmp_path / "blind.toml"
+    path.write_text(tomli_w.dumps(document))
+    with pytest.raises(ScenarioError, match="detection_range: is missing"):
+        resolve(load(path))
+    document = read(shipped()["finite_time_containment"])
+    document["graph"]["edges"].pop()
+    path.write_text(tomli_w.dumps(document))
+    with pytest.raises(ScenarioError, match="no edge 6 -> 5"):
+        resolve(load(path))
+
+
+def test_who_flies_into_an_obstacle_is_told_and_its_clearance_recorded(tmp_path: Path) -> None:
+    settings = ["obstacles=[{x=[100.0, 300.0], top=450.0}, {x=[310.0, 320.0], top=390.0}]", "claims=[]"]
+    run = simulate(mission(settings=settings, duration=12.0), tmp_path / "run")
+    entered = {event["uav"]: (event["t"], event["text"]) for event in run.events if "entered" in event["text"]}
+    assert set(entered) == {2, 3, 4, 6}
+    assert entered[4] == (0.0, "UAV 4 entered obstacle zone 1")
+    t, x, z, clearance = (run.column(name, 2) for name in ("t", "x", "z", "clearance"))
+    assert t[-1] == 12.0
+    assert entered[2][0] == pytest.approx(float(t[(x > 100.0) & (z < 450.0)][0]), abs=0.011)
+    expected = np.where((x > 100.0) & (x < 300.0), z - 450.0, np.where((x > 310.0) & (x < 320.0), z - 390.0, z))
+    np.testing.assert_array_equal(clearance, expected)
+    assert json.loads((run.path / "events.jsonl").read_text().splitlines()[-1])["schema"]
+
+
+def test_without_obstacles_there_is_no_clearance(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="no column clearance"):
+        resolve(load("containment", settings=["claims.0.signal='clearance'"]))
