@@ -50,7 +50,8 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
     try:
         trigger_rows(profile, uav, graph.senders(uav))
     except ValueError as error:
-        findings.refuse(f"leaders.{uav}: {error}")
+        field = "over_obstacles" if fields.over_obstacles else "commands"
+        findings.refuse(f"leaders.{uav}.{field}: {error}")
     return profile
 
 

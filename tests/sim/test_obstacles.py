@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ftcc.link.happenings import drained, new_happenings, note
-from ftcc.sim.cycle import report_state
 from ftcc.sim.obstacles import ENTERED, Obstacle, clearance, watch, zones_of
+from ftcc.sim.plants import cycle_of
 from ftcc.sim.spec import build
 from tests.swarm import vehicle
 
@@ -54,5 +54,7 @@ def test_a_vehicle_in_a_zone_is_noted_in_its_tick() -> None:
     low = (30.0, 3000.0, 400.0, 0.0, 0.0322, 0.0)
     fleet = build([vehicle(1, obstacles=HILLS), vehicle(2, obstacles=HILLS, initial=low)])
     alive, true = np.ones(2, np.int64), np.zeros((2, 13))
-    report_state(fleet, alive, 7, 70_000, 1, true, np.zeros(13), np.zeros((2, 13)), np.zeros((2, 4)))
+    cycle_of("longitudinal").report_state(
+        fleet, alive, 7, 70_000, 1, true, np.zeros(13), np.zeros((2, 13)), np.zeros((2, 4))
+    )
     assert drained(fleet.happenings) == [(70_000, 1, ENTERED, 1)]
