@@ -52,6 +52,8 @@ class AutopilotSpec:
     gains: tuple[float, ...]
     """In the order of the scheme's ``Gains``."""
     model: Model
+    command: tuple[float, ...]
+    """What the actuators that the law does not command are told (rad, N), by slot."""
     travel: tuple[float, ...]
     """Full deflection of each actuator (rad, N), by which commands are divided on the wire."""
     reference: OwnReference

@@ -236,12 +236,15 @@ def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[
 
 
 def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
-    """Refuse initial states and disturbances that the plant does not have."""
+    """Refuse initial states, noise and disturbances that the plant does not have."""
     starts = [("start", plan.start), *((f"start.uav.{uav}", start) for uav, start in plan.start.uav.items())]
     for where, start in starts:
         for name in Start.model_fields:
             if name not in plant.START and getattr(start, name) is not None:
                 findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
+    for name in plant.COMPLETED:
+        if getattr(plan.noise, name) > 0.0:
+            findings.refuse(f"noise.{name}: follows from the other channels as measured; give those")
     channels = [name for name, _ in plant.DISTURBANCES]
     for n, disturbance in enumerate(plan.disturbances):
         for name in disturbance.values:

@@ -16,7 +16,7 @@ from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import DIVERGED, X, Z, actuate
+from ftcc.sim.plant import DIVERGED, X, Z
 from ftcc.sim.sensors import encode_state
 
 __all__ = ["HISTORY", "Ether", "Recording", "fly"]
@@ -30,6 +30,7 @@ cycle: Any = globals()["cycle"]
 _announce = tick.announce
 _control = tick.control
 _refer = tick.refer
+_actuate = cycle.actuate
 _truth = cycle.truth
 _measure = cycle.measure
 _advance = cycle.advance
@@ -157,7 +158,7 @@ def fly(
             if wire:
                 if n > 0:
                     _latch(fleet, autopilots, i, wire, buffer)
-                actuate(fleet, i, now / 1e6)
+                _actuate(fleet, i, now / 1e6)
             _truth(fleet, i, now / 1e6, true[i])
             watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[i, X], true[i, Z])
             _measure(fleet, i, n, seed, true[i], seen)
@@ -199,7 +200,7 @@ def fly(
                 continue
             if not wire:
                 _latch(fleet, autopilots, i, wire, buffer)
-                actuate(fleet, i, now / 1e6)
+                _actuate(fleet, i, now / 1e6)
             if n % every == 0:
                 row = n // every
                 copy(true[i], recording.truth[row, i])

@@ -40,9 +40,10 @@ from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
+from ftcc.sim.airframe import scaled
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.plant import TRUTH, Disturbance, Fault, Guards
-from ftcc.sim.spec import VehicleSpec
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Guards
+from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
 
 __all__ = ["Mission", "resolve"]
 
@@ -99,7 +100,7 @@ def resolve(scenario: Scenario) -> Mission:
     limits = limits_of(plan, plant, findings)
     graph = graph_of(plan, scheme, findings)
     sheet = load_airframe(plan.airframe, scenario.file)
-    true = _airframe(plan, sheet, plant)
+    true = _airframe(plan, sheet, plant, findings)
     findings.stop_if_refused()
 
     references = own_references(plan, scheme.plant, graph.followers, timing, findings)
@@ -137,6 +138,7 @@ def resolve(scenario: Scenario) -> Mission:
             scheme=scheme.name,
             gains=tuple(gains[vehicle.uav]),
             model=model,
+            command=vehicle.command,
             travel=vehicle.travel,
             reference=references[vehicle.uav],
             neighbours=tuple(Neighbour(j, graph.weights[vehicle.uav, j]) for j in graph.senders(vehicle.uav)),
@@ -169,12 +171,14 @@ def resolve(scenario: Scenario) -> Mission:
     )
 
 
-def _airframe(plan: Plan, sheet: AirframeSheet, plant: ModuleType) -> tuple[float, ...]:
+def _airframe(plan: Plan, sheet: AirframeSheet, plant: ModuleType, findings: Findings) -> tuple[float, ...]:
     """The true parameters of the plant."""
-    values = {name: float(getattr(sheet, name)) for name in plant.Parameters._fields}
-    if not plan.plant.elevator_lift:
-        values["CLde"] = 0.0
-    return tuple(plant.Parameters(**values))
+    airframe = plant.Parameters(**{name: float(getattr(sheet, name)) for name in plant.Parameters._fields})
+    try:
+        airframe = scaled(airframe, plan.plant.coefficients)
+    except ValueError as error:
+        findings.refuse(f"plant.coefficients: {error}")
+    return tuple(airframe if plan.plant.elevator_lift else airframe._replace(CLde=0.0))
 
 
 def _initial_command(plan: Plan, plant: ModuleType, steady: dict[str, float]) -> tuple[float, ...]:
@@ -208,14 +212,19 @@ def _aircraft(
             start[name] = 1.0
     true = plant.Parameters(*airframe)
     steady = level_trim(plant, true, start["V"], f"start of UAV {uav}", findings)
-    noise = plan.noise
+    try:
+        initial = tuple(plant.initial(start, steady))
+    except ValueError as error:
+        findings.refuse(f"start of UAV {uav}: {error}")
+        initial = (math.nan,) * len(plant.State._fields)
+    noise, throttle = plan.noise, plan.plant.autothrottle
     channels = [name for name, _ in plant.DISTURBANCES]
     return VehicleSpec(
         uav=uav,
         kind="aircraft",
         plant=plants.name_of(plant),
         airframe=airframe,
-        initial=tuple(plant.initial(start, steady)),
+        initial=initial,
         command=_initial_command(plan, plant, steady),
         limits=limits,
         lag=_by_slot(plan.plant.lag, plant),
@@ -242,6 +251,7 @@ def _aircraft(
         noise=tuple(float(getattr(noise, name, 0.0)) * noise.factor for name in TRUTH),
         guards=_guards(plan),
         offset=start.get("y", 0.0),
+        autothrottle=NO_AUTOTHROTTLE if throttle is None else Autothrottle(**throttle.model_dump()),
     )
 
 

@@ -213,14 +213,26 @@ class Guards(Strict):
     sideslip: float = Field(1.4, gt=0.0, lt=1.5708, description="rad")
 
 
+class AutothrottleFields(Strict):
+    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V)."""
+
+    airspeed: float = Field(gt=0.0, description="m/s")
+    gain: float = Field(gt=0.0, description="N per m/s")
+    thrust: float = Field(ge=0.0, description="N")
+
+
 class Plant(Strict):
     """Options of the true aircraft."""
 
     model: str | None = Field(None, description="which plant flies; default: the one that the scheme is made for")
+    coefficients: dict[str, float] = Field(
+        {}, description="factors of the true aircraft's aerodynamic coefficients, of which laws know nothing, by name"
+    )
     elevator_lift: bool = Field(True, description="false: CLde = 0")
     lag: Lag = Lag()
     limits: Limits
     rate_limits: RateLimits = RateLimits()
+    autothrottle: AutothrottleFields | None = None
     fault: Literal["after_lag", "before_lag"] = "after_lag"
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
         "trim", description="position, and command in force before the first one arrives; N, rad"
@@ -408,6 +420,7 @@ class NoiseFields(Strict):
     gamma: float = Field(0.0, ge=0.0, description="rad")
     chi: float = Field(0.0, ge=0.0, description="rad")
     mu: float = Field(0.0, ge=0.0, description="rad")
+    alpha: float = Field(0.0, ge=0.0, description="rad")
     beta: float = Field(0.0, ge=0.0, description="rad")
     theta: float = Field(0.0, ge=0.0, description="rad")
     p: float = Field(0.0, ge=0.0, description="rad/s")

@@ -1,20 +1,22 @@
-"""The airframe: its coefficients and the longitudinal equations of motion.
+"""The airframe: its coefficients and equations of motion, in six degrees of freedom and in the vertical plane.
 
-The model is the monograph's (2.1)-(2.7) restricted to the vertical plane, with the elevator's lift and T sin(alpha).
+The model is the monograph's (2.1)-(2.7). Both sets of equations are of the same aircraft: in its plane of symmetry,
+without aileron and rudder, `attitude_rates` gives what `longitudinal_rates` gives.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Airframe", "Deflections", "longitudinal_rates"]
+__all__ = ["Airframe", "Deflections", "attitude_rates", "longitudinal_rates", "scaled"]
 
 
 class Airframe(NamedTuple):
-    """True parameters of a fixed-wing aircraft in its vertical plane (SI units, rad)."""
+    """True parameters of a fixed-wing aircraft (SI units, rad). Body axes: forward, right, down."""
 
     m: float
     """Mass, kg."""
@@ -38,24 +40,62 @@ class Airframe(NamedTuple):
     Cma: float
     Cmde: float
     Cmq: float
+    b: float
+    """Span, m."""
+    Ix: float
+    Iz: float
+    Ixz: float
+    """Moments and product of inertia, kg m^2."""
+    CY0: float
+    CYb: float
+    Cl0: float
+    Clb: float
+    Clda: float
+    Cldr: float
+    Clp: float
+    Clr: float
+    Cn0: float
+    Cnb: float
+    Cnda: float
+    Cndr: float
+    Cnp: float
+    Cnr: float
 
 
 class Deflections(NamedTuple):
-    """What acts on the airframe, in the order of ``ACTUATORS``."""
+    """What acts on the airframe, in the order of ``ACTUATORS``; positive ones turn about their axes negatively."""
 
     aileron: float
-    """rad."""
+    """rad, positive: right one down, rolls left."""
     elevator: float
-    """rad."""
+    """rad, positive: trailing edge down, nose down."""
     rudder: float
-    """rad."""
+    """rad, positive: trailing edge left, nose left."""
     thrust: float
     """N."""
 
 
+def scaled(airframe: Airframe, factors: Mapping[str, float]) -> Airframe:
+    """The airframe with aerodynamic coefficients times ``factors``, by name; "all" for those that are not named.
+
+    Raises
+    ------
+    ValueError
+        For a name that is no aerodynamic coefficient.
+    """
+    coefficients = [name for name in airframe._fields if name.startswith("C")]
+    unknown = [name for name in factors if name not in (*coefficients, "all")]
+    if unknown:
+        raise ValueError(
+            f"{', '.join(unknown)}: no aerodynamic coefficient; there are {', '.join(coefficients)} and all"
+        )
+    others = factors.get("all", 1.0)
+    return airframe._replace(**{name: getattr(airframe, name) * factors.get(name, others) for name in coefficients})
+
+
 @compiled
 def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
-    """Rates of (V, x, z, gamma, theta, q), eqs. (2.8)-(2.12).
+    """Rates of (V, x, z, gamma, theta, q), eqs. (2.8)-(2.12) with the elevator's lift and T sin(alpha).
 
     Parameters
     ----------
@@ -82,3 +122,64 @@ def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
         q,
         moment / a.Iy + d3,
     )
+
+
+@compiled
+def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder, thrust, d1, d2, d3, a):
+    """Rates of (V, chi, gamma, mu, alpha, beta, p, q, r), eqs. (2.2)-(2.7).
+
+    Parameters
+    ----------
+    V, gamma : float
+        Airspeed m/s, flight-path angle rad; the course chi does not enter.
+    mu, alpha, beta : float
+        Bank about the velocity, angle of attack, sideslip, rad.
+    p, q, r : float
+        Body rates, rad/s.
+    aileron, elevator, rudder, thrust : float
+        What acts, rad and N; a positive deflection turns about its own axis negatively.
+    d1, d2, d3 : float
+        Disturbances of V (m/s^2), gamma (rad/s) and q (rad/s^2).
+    a : Airframe
+    """
+    sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
+    sin_beta, cos_beta = math.sin(beta), math.cos(beta)
+    sin_mu, cos_mu = math.sin(mu), math.cos(mu)
+    sin_gamma, cos_gamma = math.sin(gamma), math.cos(gamma)
+    tan_beta = sin_beta / cos_beta
+    # Forces and moments, (2.6)-(2.7).
+    lifting = 0.5 * a.rho * V * V * a.S
+    half_span = 0.5 * a.b / V
+    drag = lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha)
+    lift = lifting * (a.CL0 + a.CLa * alpha + a.CLde * elevator)
+    side = lifting * (a.CY0 + a.CYb * beta)
+    rolling = lifting * a.b * (
+        a.Cl0 + a.Clb * beta + a.Clda * aileron + a.Cldr * rudder + half_span * (a.Clp * p + a.Clr * r)
+    )  # fmt: skip
+    pitching = lifting * a.c * (a.Cm0 + a.Cma * alpha + a.Cmde * elevator + a.Cmq * a.c * q / (2.0 * V))
+    yawing = lifting * a.b * (
+        a.Cn0 + a.Cnb * beta + a.Cnda * aileron + a.Cndr * rudder + half_span * (a.Cnp * p + a.Cnr * r)
+    )  # fmt: skip
+    # Flight path, (2.2).
+    momentum = a.m * V
+    V_dot = (thrust * cos_alpha * cos_beta - drag) / a.m - a.g * sin_gamma + d1
+    turning = thrust * (sin_alpha * sin_mu - cos_alpha * sin_beta * cos_mu)
+    chi_dot = (lift * sin_mu + side * cos_mu + turning) / (momentum * cos_gamma)
+    climbing = thrust * (cos_alpha * sin_beta * sin_mu + sin_alpha * cos_mu)
+    gamma_dot = (lift * cos_mu - side * sin_mu + climbing) / momentum - a.g * cos_gamma / V + d2
+    # Attitude against the path, (2.3).
+    about_velocity = p * cos_alpha + r * sin_alpha
+    lift_axis = chi_dot * cos_gamma * sin_mu + gamma_dot * cos_mu
+    side_axis = chi_dot * cos_gamma * cos_mu - gamma_dot * sin_mu
+    mu_dot = about_velocity / cos_beta + chi_dot * sin_gamma + lift_axis * tan_beta
+    alpha_dot = q - tan_beta * about_velocity - lift_axis / cos_beta
+    beta_dot = p * sin_alpha - r * cos_alpha + side_axis
+    # Body rates, (2.4)-(2.5).
+    inertia = a.Ix * a.Iz - a.Ixz * a.Ixz
+    c1 = ((a.Iy - a.Iz) * a.Iz - a.Ixz * a.Ixz) / inertia
+    c2 = a.Ixz * (a.Ix - a.Iy + a.Iz) / inertia
+    c8 = (a.Ix * (a.Ix - a.Iy) + a.Ixz * a.Ixz) / inertia
+    p_dot = (c1 * r + c2 * p) * q + (a.Iz * rolling + a.Ixz * yawing) / inertia
+    q_dot = ((a.Iz - a.Ix) * p * r - a.Ixz * (p * p - r * r) + pitching) / a.Iy + d3
+    r_dot = (c8 * p - c2 * r) * q + (a.Ixz * rolling + a.Ix * yawing) / inertia
+    return V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot

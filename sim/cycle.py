@@ -12,10 +12,11 @@ from typing import Any
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, store
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, actuate, disturbance, stroke
+from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, hold_speed, stroke
+from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 
-__all__ = ["advance", "fly_period", "measure", "report_state", "truth"]
+__all__ = ["actuate", "advance", "fly_period", "measure", "report_state", "truth"]
 
 if "plant" not in globals():
     raise ImportError("ftcc.sim.cycle is a template: use ftcc.sim.plants.cycle_of(plant)")
@@ -35,9 +36,23 @@ _CHANNELS = len(plant.DISTURBANCES)
 
 
 @compiled
+def _hold_speed(fleet, i):
+    if fleet.autothrottle[i, 0] > 0.0:
+        hold_speed(fleet, i, fields(_State, fleet.state[i]).V)
+
+
+@compiled
+def actuate(fleet, i, time):
+    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; to be called after each latch."""
+    _hold_speed(fleet, i)
+    plant_actuate(fleet, i, time)
+
+
+@compiled
 def _drive(fleet, i, time, step):
     """Set what acts during a step whose middle is at ``time`` (s)."""
     inputs = fleet.inputs[i]
+    _hold_speed(fleet, i)
     for slot in _SLOTS:
         inputs[0, slot], inputs[1, slot], inputs[2, slot] = stroke(fleet, i, slot, time, step)
     for channel in range(_CHANNELS):

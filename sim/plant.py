@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import compiled
 from ftcc.link.happenings import Happenings
 
@@ -20,6 +21,7 @@ __all__ = [
     "LOST",
     "TRUTH",
     "UNITS",
+    "Autothrottle",
     "Disturbance",
     "Fault",
     "Fleet",
@@ -27,6 +29,7 @@ __all__ = [
     "actuate",
     "disturbance",
     "effects",
+    "hold_speed",
     "stroke",
 ]
 
@@ -96,6 +99,17 @@ class Disturbance(NamedTuple):
     """Rate of the exponential onset, 1/s; 0 = step."""
 
 
+class Autothrottle(NamedTuple):
+    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V) within limits."""
+
+    gain: float
+    """N per m/s; 0 = none."""
+    airspeed: float
+    """m/s."""
+    thrust: float
+    """N."""
+
+
 class Fleet(NamedTuple):
     """The k vehicles of a process, a row each. Actuators stand in their slots, see ``link.actuators.SLOT``."""
 
@@ -143,6 +157,8 @@ class Fleet(NamedTuple):
     """What is to be told; the kinds are those of `obstacles`."""
     inputs: NDArray[np.float64]
     """(k, 3, 4): room for what acts at the beginning, middle and end of an integration step."""
+    autothrottle: NDArray[np.float64]
+    """(k, 4): see `Autothrottle`, then the thrust that it asks for at present, N."""
     disturbed: NDArray[np.float64]
     """(k, d): room for the disturbances of a step."""
     stages: NDArray[np.float64]
@@ -180,7 +196,17 @@ def disturbance(fleet, i, channel, time):
 
 @compiled
 def _saturated(fleet, i, actuator):
-    return min(max(fleet.command[i, actuator], fleet.limits[i, actuator, 0]), fleet.limits[i, actuator, 1])
+    asked = fleet.command[i, actuator]
+    if actuator == THRUST and fleet.autothrottle[i, 0] > 0.0:
+        asked = fleet.autothrottle[i, 3]
+    return min(max(asked, fleet.limits[i, actuator, 0]), fleet.limits[i, actuator, 1])
+
+
+@compiled
+def hold_speed(fleet, i, airspeed):
+    """Set the thrust that the autothrottle of vehicle ``i`` asks for at this airspeed (m/s)."""
+    gain, wanted, thrust = fleet.autothrottle[i, 0], fleet.autothrottle[i, 1], fleet.autothrottle[i, 2]
+    fleet.autothrottle[i, 3] = thrust + gain * (wanted - airspeed)
 
 
 @compiled
@@ -190,7 +216,7 @@ def _immediate(fleet, i, actuator):
 
 @compiled
 def actuate(fleet, i, time):
-    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; to be called after each latch."""
+    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force."""
     for actuator in range(4):
         effectiveness, bias = _fault(fleet, i, actuator, time)
         if _immediate(fleet, i, actuator):

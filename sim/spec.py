@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.happenings import new_happenings
 from ftcc.sim.obstacles import Obstacle, zones_of
-from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards
 from ftcc.sim.plants import find
 
-__all__ = ["VehicleSpec", "build"]
+__all__ = ["NO_AUTOTHROTTLE", "VehicleSpec", "build"]
+
+NO_AUTOTHROTTLE = Autothrottle(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class VehicleSpec:
     guards: Guards
     offset: float
     """Lateral position at the start, m."""
+    autothrottle: Autothrottle = NO_AUTOTHROTTLE
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
     obstacles: tuple[Obstacle, ...] = ()
@@ -95,6 +98,7 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         entered=np.zeros((k, len(specs[0].obstacles)), np.int64),
         happenings=new_happenings(),
         inputs=np.zeros((k, 3, len(ACTUATORS))),
+        autothrottle=np.array([(*spec.autothrottle, spec.autothrottle.thrust) for spec in specs], np.float64),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
         stages=np.zeros((k, 5, len(plant.State._fields))),
     )

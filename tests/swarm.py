@@ -35,8 +35,14 @@ AIRFRAME = Airframe(
     m=25.0, S=1.463, c=0.451, Iy=6.765, rho=1.205, g=9.8,
     CD0=0.0225, CDa=0.1002, CDa2=1.0778, CL0=0.2153, CLa=4.6333, CLde=0.2865,
     Cm0=-0.0954, Cma=-2.8206, Cmde=-0.9455, Cmq=-13.8189,
+    b=3.25, Ix=2.56, Iz=8.60, Ixz=0.35, CY0=0.0, CYb=-0.38,
+    Cl0=0.0, Clb=-0.035, Clda=-0.068, Cldr=0.004, Clp=-0.40, Clr=0.070,
+    Cn0=0.0, Cnb=0.0867, Cnda=0.004, Cndr=-0.0534, Cnp=-0.03, Cnr=-0.214,
 )  # fmt: skip
-"""The airframe of chapter 5."""
+"""The reference airframe."""
+
+NOMINAL = AIRFRAME[:16]
+"""What a law knows of it: the first fields of ``Model``."""
 
 TRIM = (0.0, -0.19688, 0.0, 21.303)
 """Command in level flight at 30 m/s, in the order of ``ACTUATORS``; the angle of attack there is 0.03217 rad."""
@@ -104,7 +110,8 @@ def autopilot(uav: int = 1, form: str = "flight", **changes: Any) -> AutopilotSp
         "role": "leader" if leader else "follower",
         "scheme": "containment",
         "gains": tuple(scheme.gains(form, {})),
-        "model": Model(*AIRFRAME, 0.0, 40.0, -0.7, 0.7, 20.0),
+        "model": Model(*NOMINAL, 0.0, 40.0, -0.7, 0.7, 20.0),
+        "command": vehicle().command,
         "travel": vehicle().travel,
         "reference": OwnReference((0.0, 30.0, 0.0, 0.0, 0.0, 0.0, 30.0)),
         "neighbours": tuple(Neighbour(j, WEIGHTS[uav, j]) for j in GRAPH.senders(uav)),

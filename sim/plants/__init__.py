@@ -12,7 +12,8 @@ from ftcc.link.compiled import instantiate
 
 __all__ = ["cycle_of", "find", "name_of", "names"]
 
-_REQUIRED = ("State", "Inputs", "Disturbances", "Parameters", "ACTUATORS", "DISTURBANCES", "SERVES", "START")
+_REQUIRED = ("State", "Inputs", "Disturbances", "Parameters")
+_LISTS = ("ACTUATORS", "COMPLETED", "DISTURBANCES", "SERVES", "START")
 _FUNCTIONS = ("rates", "truth", "complete", "lost", "initial", "level")
 
 
@@ -40,7 +41,7 @@ def find(name: str) -> ModuleType:
     if name not in names():
         raise LookupError(f"there is no plant {name!r}; there are {', '.join(names())}")
     module = importlib.import_module(f"{__name__}.{name}")
-    missing = [wanted for wanted in _REQUIRED + _FUNCTIONS if not hasattr(module, wanted)]
+    missing = [wanted for wanted in _REQUIRED + _LISTS + _FUNCTIONS if not hasattr(module, wanted)]
     if missing:
         raise TypeError(f"plant {name} ({module.__name__}) lacks {', '.join(missing)}")
     unknown = [actuator for actuator in module.ACTUATORS if actuator not in SLOT]

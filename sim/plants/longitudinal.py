@@ -12,6 +12,7 @@ from ftcc.sim.trim import Trim, trim
 
 __all__ = [
     "ACTUATORS",
+    "COMPLETED",
     "DISTURBANCES",
     "SERVES",
     "START",
@@ -57,6 +58,7 @@ Inputs = Deflections
 Parameters = Airframe
 ACTUATORS = ("thrust", "elevator")
 DISTURBANCES = (("d1", "m/s^2"), ("d2", "rad/s"), ("d3", "rad/s^2"))
+COMPLETED = ("alpha",)
 SERVES = ("longitudinal",)
 START = ("V", "x", "y", "z", "gamma", "theta", "q")
 
