@@ -40,14 +40,11 @@ from ftcc.link.timing import Timing
 
 __all__ = [
     "Autopilots",
-    "LinkEvents",
     "build",
     "lead",
-    "link_events",
     "placeholder",
     "sense",
     "sense_all",
-    "set_links",
     "tick_of",
 ]
 
@@ -105,23 +102,6 @@ class Autopilots(NamedTuple):
     """(m,): which entries of its `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
     """(n,): index into ``ACTUATORS`` of each of the scheme's commands."""
-
-
-class LinkEvents(NamedTuple):
-    """Changes of the links of a process's UAVs, in order of time."""
-
-    at_us: NDArray[np.int64]
-    """(n,)."""
-    uav: NDArray[np.int64]
-    """(n,): index of the UAV in the process."""
-    edge: NDArray[np.int64]
-    """(n,): its in-edge, or -1 for its own radio."""
-    quality: NDArray[np.float64]
-    """(n, 7): see `Channel`."""
-    position: NDArray[np.int64]
-    """(1,): the next event."""
-    radio_on: NDArray[np.int64]
-    """(k,): 0 while a UAV's own radio is off."""
 
 
 @functools.cache
@@ -232,37 +212,6 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         ),
         inbox,
     )
-
-
-def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
-    """The link events of ``specs`` in one table, in order of time."""
-    rows = [
-        (event.at_us, i, -1 if event.sender is None else [n.uav for n in spec.neighbours].index(event.sender), event)
-        for i, spec in enumerate(specs)
-        for event in spec.link_events
-    ]
-    rows.sort(key=lambda row: row[:3])
-    return LinkEvents(
-        at_us=np.array([row[0] for row in rows], np.int64),
-        uav=np.array([row[1] for row in rows], np.int64),
-        edge=np.array([row[2] for row in rows], np.int64),
-        quality=np.array([row[3].channel for row in rows], np.float64).reshape(len(rows), len(Channel._fields)),
-        position=np.zeros(1, np.int64),
-        radio_on=np.ones(len(specs), np.int64),
-    )
-
-
-@compiled
-def set_links(events, inbox, now_us):
-    """Bring all link events up to ``now_us`` into force."""
-    while events.position[0] < events.at_us.shape[0] and events.at_us[events.position[0]] <= now_us:
-        n = events.position[0]
-        i = events.uav[n]
-        if events.edge[n] < 0:
-            events.radio_on[i] = 0 if events.quality[n, 6] > 0.0 else 1
-        else:
-            copy(events.quality[n], inbox.quality[i, events.edge[n]])
-        events.position[0] += 1
 
 
 @compiled

@@ -69,3 +69,13 @@ class AutopilotSpec:
     """Lateral position, m."""
     hearers: tuple[int, ...] = field(default=())
     """Ids of those who hear this UAV."""
+
+    def edge_from(self, sender: int) -> int:
+        """Index of the in-edge from a neighbour.
+
+        Raises
+        ------
+        ValueError
+            If this UAV does not hear it.
+        """
+        return [neighbour.uav for neighbour in self.neighbours].index(sender)

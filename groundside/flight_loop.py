@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import lead, sense, set_links
+from ftcc.airside.autopilots import lead, sense
+from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear
 from ftcc.link.compiled import compiled, copy, fill

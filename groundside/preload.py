@@ -10,7 +10,8 @@ import os
 
 from ftcc.airside import process as autopilot_process
 from ftcc.airside.autopilots import build as build_autopilots
-from ftcc.airside.autopilots import link_events, placeholder, tick_of
+from ftcc.airside.autopilots import placeholder, tick_of
+from ftcc.airside.link_events import link_events
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.timing import Timing
 from ftcc.sim import process as vehicle_process

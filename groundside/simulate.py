@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.autopilots import build as build_autopilots
-from ftcc.airside.autopilots import link_events, tick_of
+from ftcc.airside.autopilots import tick_of
+from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_signals
 from ftcc.link.actuators import ACTUATORS, in_slots

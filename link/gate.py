@@ -62,6 +62,10 @@ class Said:
     text: str
     uav: int | None = None
     at_us: int | None = None
+    who: str = ""
+    """Who asked for it, where somebody on the ground did."""
+    outcome: str = ""
+    """What became of that."""
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,15 @@
-"""MAVLink 2 over connected UDP: one endpoint a socket, and the messages that vehicle and autopilot exchange.
-
-The bare dialect class is used (not mavutil): a quarter of the import time and half of the memory.
-"""
+"""MAVLink 2 over connected UDP: one endpoint a socket, and the messages that vehicle and autopilot exchange."""
 
 from __future__ import annotations
 
-import math
-import operator
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import common as dialect
+
+from ftcc.link.codec import Codec, dialect
 
 __all__ = [
     "AUTOPILOT",
@@ -74,18 +70,13 @@ class Endpoint:
     def __init__(
         self, system: int, component: int, port: int, peer: tuple[str, int] | None = None, host: str = LOOPBACK
     ) -> None:
-        self._mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
-        self._mav.robust_parsing = True
+        self.codec = Codec(system, component)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.bind((host, port))
         if peer is not None:
             self._socket.connect(peer)
         self._last: bytes = b""
-        self.bad_data = 0
-        """Pieces of datagrams that were not valid MAVLink."""
-        self.not_finite = 0
-        """Messages dropped because a float in them was nan or inf."""
 
     def fileno(self) -> int:
         """For ``select``."""
@@ -107,26 +98,21 @@ class Endpoint:
         ValueError
             If a float in one of them is nan, inf or beyond float32: such a value would be believed on the other side.
         """
-        datagram = bytearray()
-        for message in messages:
-            if not _finite(message):
-                raise ValueError(f"{message.get_type()} holds a value that is not finite: {message}")
-            try:
-                datagram += message.pack(self._mav)
-            except OverflowError as error:
-                raise ValueError(f"{message.get_type()} holds a value that float32 cannot: {message}") from error
-            self._mav.seq = (self._mav.seq + 1) % 256
-        self._last = bytes(datagram)
-        self._put()
+        self._last = self.codec.pack(*messages)
+        self._put(self._last)
+
+    def send_aside(self, *messages: Any) -> None:
+        """Send ``messages`` in one datagram of which `send_again` takes no notice."""
+        self._put(self.codec.pack(*messages))
 
     def send_again(self) -> None:
         """Send the last datagram once more, e.g. because its answer is late."""
         if self._last:
-            self._put()
+            self._put(self._last)
 
-    def _put(self) -> None:
+    def _put(self, datagram: bytes) -> None:
         try:
-            self._socket.send(self._last)
+            self._socket.send(datagram)
         except ConnectionRefusedError:
             return  # The peer is not there (yet, or any more); whoever waits for its answer notices.
         except BlockingIOError:
@@ -142,52 +128,8 @@ class Endpoint:
                 break
             except ConnectionRefusedError:
                 continue
-            for message in self._mav.parse_buffer(datagram) or ():
-                if message.get_msgId() < 0:
-                    self.bad_data += 1
-                elif _finite(message):
-                    messages.append(message)
-                else:
-                    self.not_finite += 1
-            self._forget()
+            messages += self.codec.parse(datagram)
         return messages
-
-    def _forget(self) -> None:
-        """Reset the parser: after one forged header it would swallow the next good datagrams."""
-        if self._mav.buf_len() > 0:
-            self.bad_data += 1
-        self._mav.buf = bytearray()
-        self._mav.buf_index = 0
-        self._mav.expected_length = dialect.HEADER_LEN_V1 + 2
-        self._mav.have_prefix_error = False
-
-
-_MAY_HOLD_NAN = ("COMMAND_LONG", "COMMAND_INT", "PARAM_SET", "PARAM_VALUE")
-"""Here nan means "not given", or is the bit pattern of an integer: the readers check what they use."""
-
-_sum_floats: dict[int, Callable[[Any], float]] = {}
-
-
-def _adder(message: Any) -> Callable[[Any], float]:
-    """A function that adds up all floats of such a message: the sum is finite only if every term is."""
-    kinds = zip(message.fieldnames, message.fieldtypes, strict=True)
-    names = [name for name, kind in kinds if kind in ("float", "double")]
-    if message.get_type() in _MAY_HOLD_NAN:
-        names = []
-    arrays = [name for name in names if not isinstance(getattr(message, name), float | int)]
-    scalars = [name for name in names if name not in arrays]
-    # An attrgetter of one name gives the value itself: the second name makes it a tuple.
-    read_scalars = operator.attrgetter(*(scalars * 2)) if scalars else lambda _: ()
-    read_arrays = operator.attrgetter(*(arrays * 2)) if arrays else lambda _: ()
-    return lambda one: sum(read_scalars(one)) + sum(map(sum, read_arrays(one)))
-
-
-def _finite(message: Any) -> bool:
-    kind = message.get_msgId()
-    add = _sum_floats.get(kind)
-    if add is None:
-        add = _sum_floats[kind] = _adder(message)
-    return math.isfinite(add(message))
 
 
 def state_messages(stamp_us: int, state: NDArray[np.float64], controls: NDArray[np.float64] | None) -> tuple[Any, ...]:

@@ -14,7 +14,7 @@ from ftcc.link.mavlink import LOOPBACK
 __all__ = ["PortBlock", "PortError", "UavPorts", "reserve", "runtime_folder"]
 
 _FIRST, _END = 20000, 32768
-_PER_UAV = 4
+_PER_UAV = 6
 _SHARED = 4
 
 
@@ -27,9 +27,16 @@ class UavPorts:
     """Ports of one UAV."""
 
     vehicle: int
+    """The vehicle's end of the pair."""
     autopilot: int
+    """The autopilot's end of the pair."""
     ground: int
+    """Where the autopilot hears whoever calls."""
     mesh: int
+    telemetry: int
+    """From which the autopilot tells the station."""
+    truth: int
+    """From which the vehicle tells the station."""
 
 
 @dataclass
@@ -54,7 +61,7 @@ class PortBlock:
     def of(self, uav: int) -> UavPorts:
         """The ports of a UAV."""
         first = self.base + _SHARED + _PER_UAV * self.uavs.index(uav)
-        return UavPorts(first, first + 1, first + 2, first + 3)
+        return UavPorts(*range(first, first + _PER_UAV))
 
     @property
     def size(self) -> int:

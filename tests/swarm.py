@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, build, link_events
+from ftcc.airside.autopilots import Autopilots, build
+from ftcc.airside.link_events import link_events
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme

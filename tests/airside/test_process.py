@@ -53,7 +53,7 @@ def test_a_state_of_which_a_part_was_dropped_does_not_shift_those_after_it(bench
     """One of the three messages holds nan and never passes: that state is incomplete, the next is whole."""
     attitude, position, force = state(0)
     position.x = math.nan
-    data = b"".join(message.pack(bench.vehicle._mav) for message in (attitude, position, force))
+    data = b"".join(message.pack(bench.vehicle.codec._mav) for message in (attitude, position, force))
     bench.vehicle._socket.send(data)
     bench.vehicle.send(*state(1))
     bench.vehicle.send(*state(2))

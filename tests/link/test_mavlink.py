@@ -194,7 +194,7 @@ def test_a_value_that_is_not_finite_is_dropped_on_arrival_and_counted(pair, valu
         "LOCAL_POSITION_NED",
         "HIL_ACTUATOR_CONTROLS",
     ]
-    assert pair.autopilot.not_finite == 2
+    assert pair.autopilot.codec.not_finite == 2
 
 
 def test_commands_keep_the_nan_that_means_not_given(pair):
@@ -228,7 +228,7 @@ def test_bad_bytes_swallow_nothing_of_the_datagrams_after_them(pair, bad):
     messages = gathered(pair.autopilot, 60)
     stamps = [read_state(messages[3 * n : 3 * n + 3], np.zeros(13), np.zeros(4))[0] for n in range(20)]
     assert stamps == [n * 10_000 for n in range(20)]
-    assert pair.autopilot.bad_data >= 20
+    assert pair.autopilot.codec.bad_data >= 20
 
 
 def test_a_datagram_cut_short_gives_its_whole_messages_and_harms_no_other(pair):
@@ -243,7 +243,7 @@ def test_a_flipped_bit_is_bad_data(pair):
     good[20] ^= 1
     pair.vehicle.send(bytes(good))
     assert [m.get_type() for m in arrived(pair.autopilot)] == ["LOCAL_POSITION_NED", "HIL_ACTUATOR_CONTROLS"]
-    assert pair.autopilot.bad_data > 0
+    assert pair.autopilot.codec.bad_data > 0
 
 
 def test_datagrams_per_reading_are_capped_and_the_rest_is_kept(pair):

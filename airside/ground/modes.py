@@ -1,0 +1,30 @@
+"""Flight modes as a PX4-type ground station names them, and what they mean here.
+
+mission: the scheme flies. hold: what is referred to stands still and neighbours are ignored; they are still told.
+offboard: targets from the ground.
+"""
+
+from __future__ import annotations
+
+from ftcc.airside.modes import HOLD, MISSION, OFFBOARD
+
+__all__ = ["NAMES", "custom_mode", "mode_of"]
+
+NAMES = {MISSION: "mission", HOLD: "hold", OFFBOARD: "offboard"}
+
+_PX4 = {MISSION: (4, 4), HOLD: (4, 3), OFFBOARD: (6, 0)}
+"""PX4's main and sub mode: AUTO MISSION, AUTO LOITER, OFFBOARD."""
+
+
+def custom_mode(mode: int) -> int:
+    """The custom mode of HEARTBEAT."""
+    main, sub = _PX4[mode]
+    return main << 16 | sub << 24
+
+
+def mode_of(main: float, sub: float) -> int | None:
+    """Our mode, or None where PX4's means nothing here."""
+    for mode, (its_main, its_sub) in _PX4.items():
+        if main == its_main and (sub == its_sub or its_main == 6):
+            return mode
+    return None

@@ -1,0 +1,95 @@
+"""What an autopilot's side towards the ground sees of it, and may touch: one autopilot among those of its process."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.link_events import LinkEvents
+from ftcc.airside.scheme import Scheme
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.channel import Inbox
+from ftcc.link.gate import Said
+from ftcc.link.mavlink import Endpoint
+from ftcc.link.process import Setting
+
+__all__ = ["Home", "Seat"]
+
+_EARTH = 6_378_137.0
+"""Radius, m."""
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where on earth the origin of the swarm's local frame lies, so that maps have something to show."""
+
+    latitude: float
+    """deg."""
+    longitude: float
+    """deg."""
+    altitude: float
+    """m above mean sea level at z = 0."""
+
+    def place(self, north: float, east: float) -> tuple[int, int]:
+        """Latitude and longitude (1e-7 deg) of a point of the local frame (m), on a sphere, near the origin."""
+        latitude = self.latitude + math.degrees(north / _EARTH)
+        longitude = self.longitude + math.degrees(east / (_EARTH * math.cos(math.radians(self.latitude))))
+        return round(max(-90.0, min(90.0, latitude)) * 1e7), round((longitude + 180.0) % 360.0 * 1e7) - 1_800_000_000
+
+
+@dataclass
+class Seat:
+    """One autopilot: its row of the arrays, its vehicle, and how it speaks to its launcher."""
+
+    spec: AutopilotSpec
+    i: int
+    """Its row."""
+    setting: Setting
+    scheme: Scheme
+    autopilots: Autopilots
+    inbox: Inbox
+    events: LinkEvents
+    message: NDArray[np.float64]
+    """(13,): the vehicle's last state, as its messages bring it."""
+    controls: NDArray[np.float64]
+    """(4,): the last command, fractions of travel."""
+    vehicle: Endpoint
+    tell: Callable[[Said], None]
+    """Says something to the launcher."""
+    now_us: int = 0
+    """Simulated time of the last tick."""
+    alive: bool = True
+    sizes: dict[str, float] = field(default_factory=dict)
+    """Parameters FAIL_*: how large the next failure is."""
+    at_ms: int = 0
+    """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
+    failures_enabled: int = 1
+    """Parameter SYS_FAILURE_EN."""
+
+    @property
+    def leader(self) -> bool:
+        """Whether it is a leader's."""
+        return self.spec.role == "leader"
+
+    @property
+    def home(self) -> Home:
+        """Where the swarm flies."""
+        return Home(*self.setting.home)
+
+    @property
+    def next_us(self) -> int:
+        """Simulated time of the next tick, the earliest at which anything can act."""
+        return self.now_us + self.setting.timing.period_us if self.started else 0
+
+    started: bool = False
+    """Whether there has been a tick."""
+
+    def note(self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None) -> None:
+        """Have something logged and shown on the ground."""
+        when = self.now_us if at_us is None else at_us
+        self.tell(Said(severity, text, self.spec.uav, when, who, outcome))

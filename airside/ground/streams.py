@@ -1,0 +1,356 @@
+"""Telemetry: the messages that an autopilot sends of itself, each with its rate, and what it sends when asked."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from ftcc.airside.flight_path import Own
+from ftcc.airside.ground.modes import custom_mode
+from ftcc.airside.ground.seat import Seat
+from ftcc.link.actuators import THRUST
+from ftcc.link.compiled import fields
+from ftcc.link.mavlink import dialect, float_array
+
+__all__ = ["LINK_FIELDS", "ON_REQUEST", "STREAMS", "Schedule", "Stream", "heartbeat", "rates_of", "requested"]
+
+LINK_FIELDS = ("sender", "age", "received", "lost", "cut")
+"""Numbers per in-edge in the DEBUG_FLOAT_ARRAY "links"; age -1 = never heard."""
+
+_M = dialect
+_SLACK = 0.9
+"""A message that is due a little early is sent: a tick that comes early must not halve the rate."""
+
+
+def heartbeat(seat: Seat, alive: bool = True) -> Any:
+    """HEARTBEAT: a fixed-wing aircraft with PX4's modes, armed, in the air."""
+    flags = (
+        _M.MAV_MODE_FLAG_SAFETY_ARMED
+        | _M.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        | _M.MAV_MODE_FLAG_AUTO_ENABLED
+        | _M.MAV_MODE_FLAG_GUIDED_ENABLED
+        | _M.MAV_MODE_FLAG_STABILIZE_ENABLED
+    )
+    status = _M.MAV_STATE_ACTIVE if alive else _M.MAV_STATE_EMERGENCY
+    mode = custom_mode(int(seat.autopilots.mode[seat.i]))
+    return _M.MAVLink_heartbeat_message(_M.MAV_TYPE_FIXED_WING, _M.MAV_AUTOPILOT_PX4, flags, mode, status, 3)
+
+
+def _stamp(seat: Seat) -> int:
+    return seat.now_us // 1000
+
+
+def _attitude(seat: Seat) -> Any:
+    q0, q1, q2, q3, p, q, r = seat.message[:7].tolist()
+    roll = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q0 * q2 - q3 * q1))))
+    yaw = math.atan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
+    return _M.MAVLink_attitude_message(_stamp(seat), roll, pitch, yaw, p, q, r)
+
+
+def _attitude_quaternion(seat: Seat) -> Any:
+    return _M.MAVLink_attitude_quaternion_message(_stamp(seat), *seat.message[:7].tolist())
+
+
+def _local_position(seat: Seat) -> Any:
+    return _M.MAVLink_local_position_ned_message(_stamp(seat), *seat.message[7:].tolist())
+
+
+def _whole(value: float, bits: int, signed: bool = True) -> int:
+    """The nearest integer that fits."""
+    low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    return max(low, min(high, round(value)))
+
+
+def _heading(seat: Seat) -> float:
+    """Degrees, 0..360."""
+    return math.degrees(_attitude(seat).yaw) % 360.0
+
+
+def _global_position(seat: Seat) -> Any:
+    x, y, z, vx, vy, vz = seat.message[7:].tolist()
+    latitude, longitude = seat.home.place(x, y)
+    return _M.MAVLink_global_position_int_message(
+        _stamp(seat),
+        latitude,
+        longitude,
+        _whole((seat.home.altitude - z) * 1e3, 32),
+        _whole(-z * 1e3, 32),
+        _whole(vx * 1e2, 16),
+        _whole(vy * 1e2, 16),
+        _whole(vz * 1e2, 16),
+        int(_heading(seat) * 1e2) % 36000,
+    )
+
+
+def _gps_raw(seat: Seat) -> Any:
+    x, y, z, vx, vy, vz = seat.message[7:].tolist()
+    latitude, longitude = seat.home.place(x, y)
+    course = math.degrees(math.atan2(vy, vx)) % 360.0
+    return _M.MAVLink_gps_raw_int_message(
+        seat.now_us,
+        _M.GPS_FIX_TYPE_3D_FIX,
+        latitude,
+        longitude,
+        _whole((seat.home.altitude - z) * 1e3, 32),
+        100,
+        100,
+        _whole(math.sqrt(vx * vx + vy * vy + vz * vz) * 1e2, 16, signed=False),
+        int(course * 1e2) % 36000,
+        12,
+    )
+
+
+def _vfr_hud(seat: Seat) -> Any:
+    _, _, z, vx, vy, vz = seat.message[7:].tolist()
+    ground = math.sqrt(vx * vx + vy * vy)
+    throttle = _whole(100.0 * float(seat.controls[THRUST]), 16, signed=False)
+    altitude = seat.home.altitude - z
+    # Still air: airspeed is speed.
+    airspeed = math.sqrt(ground * ground + vz * vz)
+    return _M.MAVLink_vfr_hud_message(airspeed, ground, int(_heading(seat)), throttle, altitude, -vz)
+
+
+_SENSORS = (
+    _M.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | _M.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | _M.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | _M.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | _M.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
+    | _M.MAV_SYS_STATUS_SENSOR_GPS
+    | _M.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | _M.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | _M.MAV_SYS_STATUS_AHRS
+    | _M.MAV_SYS_STATUS_PREARM_CHECK
+)
+
+
+def _sys_status(seat: Seat) -> Any:
+    lost = int(seat.inbox.edges[seat.i, : seat.inbox.degree[seat.i], 5].sum())
+    received = int(seat.inbox.edges[seat.i, : seat.inbox.degree[seat.i], 4].sum())
+    share = round(1e4 * lost / max(1, lost + received))
+    # No battery is modelled: unknown voltage and current, 100 % so that no client raises an alarm.
+    return _M.MAVLink_sys_status_message(
+        _SENSORS, _SENSORS, _SENSORS, 0, 65535, -1, 100, share, min(65535, lost), 0, 0, 0, 0
+    )
+
+
+def _extended_state(seat: Seat) -> Any:
+    return _M.MAVLink_extended_sys_state_message(_M.MAV_VTOL_STATE_UNDEFINED, _M.MAV_LANDED_STATE_IN_AIR)
+
+
+def _system_time(seat: Seat) -> Any:
+    return _M.MAVLink_system_time_message(time.time_ns() // 1000, _stamp(seat))
+
+
+def _servos(seat: Seat) -> Any:
+    pulses = [_whole(1500.0 + 500.0 * fraction, 16, signed=False) for fraction in seat.controls.tolist()]
+    pulses[THRUST] = _whole(1000.0 + 1000.0 * float(seat.controls[THRUST]), 16, signed=False)
+    return _M.MAVLink_servo_output_raw_message(seat.now_us % 2**32, 0, *pulses, 0, 0, 0, 0)
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def _signal(seat: Seat, *names: str) -> float | None:
+    """The first of the signals that the scheme has."""
+    for n, quantity in enumerate(seat.scheme.signals):
+        if quantity.name in names:
+            return float(seat.autopilots.signals[seat.i, n])
+    return None
+
+
+def _attitude_target(seat: Seat) -> Any:
+    own = fields(Own, seat.autopilots.own[seat.i])
+    pitch = own.theta if seat.leader else _signal(seat, "theta_d")
+    rate = 0.0 if seat.leader else _signal(seat, "q_d")
+    ignored = _M.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE | _M.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+    if pitch is None:
+        ignored |= _M.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+    if rate is None:
+        ignored |= _M.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+    thrust = max(0.0, min(1.0, float(seat.controls[THRUST])))
+    return _M.MAVLink_attitude_target_message(
+        _stamp(seat), ignored, _quaternion(0.0, _finite(pitch), own.chi), 0.0, _finite(rate), 0.0, thrust
+    )
+
+
+def _finite(value: float | None) -> float:
+    return value if value is not None and math.isfinite(value) else 0.0
+
+
+_NOTHING = 0b1111_1111_1111
+"""POSITION_TARGET_TYPEMASK: everything ignored."""
+
+
+def _position_target(seat: Seat) -> Any:
+    mask = _NOTHING
+    x = y = z = vx = vz = 0.0
+    if seat.leader:
+        _, x, y, z, vx, _, vz = seat.autopilots.target[seat.i].tolist()
+        mask &= ~0b111_111
+    else:
+        tracked = _signal(seat, "z_r", "zhat", "z_d")
+        if tracked is not None and math.isfinite(tracked):
+            z = tracked
+            mask &= ~_M.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    return _M.MAVLink_position_target_local_ned_message(
+        _stamp(seat), _M.MAV_FRAME_LOCAL_NED, mask, x, y, -z, vx, 0.0, -vz, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def _signals(seat: Seat) -> Any:
+    return float_array(seat.now_us, "signals", seat.autopilots.signals[seat.i].tolist())
+
+
+def _links(seat: Seat) -> Any:
+    inbox, i = seat.inbox, seat.i
+    values: list[float] = []
+    for edge in range(int(inbox.degree[i])):
+        sender, _, _, _, received, lost, _ = inbox.edges[i, edge].tolist()
+        cut = inbox.quality[i, edge, 6] > 0.0 or not seat.events.radio_on[i]
+        age = float(inbox.age[i, edge]) if inbox.valid[i, edge] else -1.0
+        values += [sender, age, received, lost, float(cut)]
+    return float_array(seat.now_us, "links", values)
+
+
+def _home_position(seat: Seat) -> Any:
+    latitude, longitude = seat.home.place(0.0, 0.0)
+    altitude = _whole(seat.home.altitude * 1e3, 32)
+    return _M.MAVLink_home_position_message(
+        latitude, longitude, altitude, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, seat.now_us
+    )
+
+
+class Stream(NamedTuple):
+    """A message that is sent again and again."""
+
+    name: str
+    """Of its parameter, behind SR_."""
+    message: int
+    rate: float
+    """Hz of simulated time, towards a ground station, unless asked otherwise; 0 = only when asked."""
+    to_station: float
+    """Hz towards the swarm's own station, which records everything."""
+    make: Callable[[Seat], Any]
+    followers_only: bool = False
+
+
+STREAMS = (
+    Stream("ATTITUDE", _M.MAVLINK_MSG_ID_ATTITUDE, 10.0, 10.0, _attitude),
+    Stream("ATT_QUAT", _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, 0.0, 0.0, _attitude_quaternion),
+    Stream("LOCAL_POS", _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 10.0, 10.0, _local_position),
+    Stream("GLOBAL_POS", _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5.0, 0.0, _global_position),
+    Stream("GPS_RAW", _M.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0, 0.0, _gps_raw),
+    Stream("VFR_HUD", _M.MAVLINK_MSG_ID_VFR_HUD, 5.0, 0.0, _vfr_hud),
+    Stream("SYS_STATUS", _M.MAVLINK_MSG_ID_SYS_STATUS, 1.0, 1.0, _sys_status),
+    Stream("EXT_STATE", _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 1.0, 0.0, _extended_state),
+    Stream("SYS_TIME", _M.MAVLINK_MSG_ID_SYSTEM_TIME, 1.0, 0.0, _system_time),
+    Stream("SERVOS", _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0, 0.0, _servos),
+    Stream("ATT_TARGET", _M.MAVLINK_MSG_ID_ATTITUDE_TARGET, 2.0, 0.0, _attitude_target),
+    Stream("POS_TARGET", _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED, 2.0, 0.0, _position_target),
+    Stream("SIGNALS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 10.0, _signals, followers_only=True),
+    Stream("LINKS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 1.0, 10.0, _links),
+    Stream("HOME", _M.MAVLINK_MSG_ID_HOME_POSITION, 0.5, 0.0, _home_position),
+)
+"""Everything that flows of itself, beside HEARTBEAT."""
+
+
+def rates_of(seat: Seat, station: bool) -> list[float]:
+    """Rates in the order of `STREAMS`, Hz, towards a ground station or the swarm's own."""
+    return [
+        0.0 if stream.followers_only and seat.leader else stream.to_station if station else stream.rate
+        for stream in STREAMS
+    ]
+
+
+def _autopilot_version(seat: Seat) -> Any:
+    capabilities = (
+        _M.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | _M.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | _M.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+        | _M.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        | _M.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+        | _M.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+        | _M.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    )
+    # The version of the interface that is spoken, PX4 1.15: what clients decide by is what such an autopilot does.
+    version = 1 << 24 | 15 << 16 | 255
+    nothing = (0,) * 8
+    return _M.MAVLink_autopilot_version_message(
+        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, seat.spec.uav
+    )
+
+
+ON_REQUEST: dict[int, Callable[[Seat], Any]] = {
+    _M.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+    _M.MAVLINK_MSG_ID_HOME_POSITION: _home_position,
+    _M.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    _M.MAVLINK_MSG_ID_MISSION_CURRENT: lambda seat: _M.MAVLink_mission_current_message(0),
+}
+"""Messages that come when they are asked for, beside those of `STREAMS`."""
+
+
+def requested(seat: Seat, message: int) -> list[Any]:
+    """What REQUEST_MESSAGE brings; nothing where the message is unknown here."""
+    if message in ON_REQUEST:
+        return [ON_REQUEST[message](seat)]
+    return [
+        stream.make(seat)
+        for stream in STREAMS
+        if stream.message == message and not (stream.followers_only and seat.leader)
+    ]
+
+
+class Schedule:
+    """When which stream is due towards one peer: at its rate in simulated or in wall time, whichever is slower."""
+
+    def __init__(self, rates: Iterable[float]) -> None:
+        self._rates = list(rates)
+        self._last_us = [-(10**12)] * len(self._rates)
+        self._last_wall = [-math.inf] * len(self._rates)
+        self._next_us = 0
+
+    def set(self, n: int, rate: float) -> None:
+        """Set the rate of stream ``n``, Hz; 0 = silent."""
+        self._rates[n] = rate
+        self._next_us = 0
+
+    def rate(self, n: int) -> float:
+        """Rate of stream ``n``, Hz."""
+        return self._rates[n]
+
+    def due(self, now_us: int) -> list[int]:
+        """The streams that are due at this tick."""
+        if now_us < self._next_us:
+            return []
+        wall = time.monotonic()
+        found = []
+        following = now_us + 1_000_000
+        for n, rate in enumerate(self._rates):
+            if rate <= 0.0:
+                continue
+            interval_us = 1e6 / rate
+            if now_us - self._last_us[n] >= _SLACK * interval_us:
+                if wall - self._last_wall[n] < _SLACK / rate:
+                    following = now_us  # due, but the wall clock is behind: look again at the next tick
+                    continue
+                # On the grid of the rate, so that a tick's length does not add up.
+                behind = now_us - self._last_us[n]
+                self._last_us[n] += int(behind // interval_us * interval_us) or int(interval_us)
+                self._last_wall[n] = wall
+                found.append(n)
+            following = min(following, int(self._last_us[n] + _SLACK * interval_us))
+        self._next_us = following
+        return found

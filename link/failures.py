@@ -1,0 +1,208 @@
+"""What can be made to fail, in MAVLink's words: the one table of what MAV_CMD_INJECT_FAILURE means here.
+
+Both processes of a UAV read it: the autopilot answers the ground and degrades the radio, the vehicle fails actuators
+and the navigation solution that it sends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ftcc.link.codec import dialect
+
+__all__ = [
+    "AIRFRAME_SIZES",
+    "DEFAULTS",
+    "EVERY",
+    "FAILURES",
+    "KINDS",
+    "LINK_SIZES",
+    "SIZES",
+    "UNITS",
+    "Failure",
+    "Meaning",
+    "Size",
+    "Unit",
+    "meaning_of",
+]
+
+KINDS = {
+    "ok": dialect.FAILURE_TYPE_OK,
+    "off": dialect.FAILURE_TYPE_OFF,
+    "stuck": dialect.FAILURE_TYPE_STUCK,
+    "wrong": dialect.FAILURE_TYPE_WRONG,
+    "slow": dialect.FAILURE_TYPE_SLOW,
+    "delayed": dialect.FAILURE_TYPE_DELAYED,
+    "intermittent": dialect.FAILURE_TYPE_INTERMITTENT,
+}
+"""Kinds of failure by our names."""
+
+EVERY = 0
+"""Instance that stands for all of a unit."""
+
+
+class Size(NamedTuple):
+    """How large a failure is: a parameter of the UAV."""
+
+    name: str
+    default: float
+    low: float
+    high: float
+    unit: str
+    meaning: str
+
+
+_ANY = 1e6
+
+AIRFRAME_SIZES = (
+    Size("FAIL_EFF", 0.5, 0.0, 1.0, "-", "remaining effectiveness of an actuator"),
+    Size("FAIL_BIAS", 0.0, -_ANY, _ANY, "rad or N", "bias of an actuator"),
+    Size("FAIL_EFF_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the loss, 0 = step"),
+    Size("FAIL_BIAS_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the bias, 0 = step"),
+    Size("FAIL_SLEW", 0.1, 1e-6, _ANY, "rad/s or N/s", "largest rate of a slow actuator"),
+    Size("FAIL_PERIOD", 1.0, 1e-3, 1e4, "s", "period of an intermittent failure, of a slow solution's updates"),
+    Size("FAIL_DUTY", 0.5, 0.0, 1.0, "-", "healthy share of that period"),
+    Size("FAIL_POS_N", 0.0, -_ANY, _ANY, "m", "wrong position, north"),
+    Size("FAIL_POS_E", 0.0, -_ANY, _ANY, "m", "wrong position, east"),
+    Size("FAIL_POS_D", 0.0, -_ANY, _ANY, "m", "wrong position, down"),
+    Size("FAIL_VEL_N", 0.0, -1e3, 1e3, "m/s", "wrong velocity, north"),
+    Size("FAIL_VEL_E", 0.0, -1e3, 1e3, "m/s", "wrong velocity, east"),
+    Size("FAIL_VEL_D", 0.0, -1e3, 1e3, "m/s", "wrong velocity, down"),
+    Size("FAIL_ROLL", 0.0, -3.2, 3.2, "rad", "wrong roll angle"),
+    Size("FAIL_PITCH", 0.0, -1.6, 1.6, "rad", "wrong pitch angle"),
+    Size("FAIL_YAW", 0.0, -3.2, 3.2, "rad", "wrong yaw angle"),
+    Size("FAIL_P", 0.0, -1e2, 1e2, "rad/s", "wrong roll rate"),
+    Size("FAIL_Q", 0.0, -1e2, 1e2, "rad/s", "wrong pitch rate"),
+    Size("FAIL_R", 0.0, -1e2, 1e2, "rad/s", "wrong yaw rate"),
+)
+"""In the order in which the autopilot tells its vehicle."""
+
+LINK_SIZES = (
+    Size("FAIL_LOSS", 0.3, 0.0, 1.0, "-", "probability that a record is lost"),
+    Size("FAIL_BURST_S", 0.0, 0.0, 1.0, "-", "probability per record of entering a burst of losses"),
+    Size("FAIL_BURST_E", 1.0, 0.0, 1.0, "-", "probability per record of leaving it"),
+    Size("FAIL_BURST_L", 1.0, 0.0, 1.0, "-", "probability of loss within a burst"),
+    Size("FAIL_DELAY", 0.1, 0.0, 1e2, "s", "delay beyond the link latency"),
+    Size("FAIL_JITTER", 0.1, 0.0, 1e2, "s", "further delay, uniform in [0, jitter]"),
+)
+"""The columns of `Channel`, but for ``blocked``, in their order."""
+
+SIZES = (*AIRFRAME_SIZES, *LINK_SIZES)
+DEFAULTS = {size.name: size.default for size in SIZES}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Something that can fail."""
+
+    name: str
+    """In MAVLink, without FAILURE_UNIT_."""
+    code: int
+    instances: str
+    """Which there are, for people."""
+    highest: int
+    """Largest instance; 0 stands for all of them."""
+    on_board: bool
+    """The airframe's, to be answered by the vehicle; otherwise the radio's, the autopilot's own affair."""
+
+
+_SERVO = Unit("SYSTEM_SERVO", dialect.FAILURE_UNIT_SYSTEM_SERVO, "1 aileron, 2 elevator, 3 rudder; 0 all", 3, True)
+_MOTOR = Unit("SYSTEM_MOTOR", dialect.FAILURE_UNIT_SYSTEM_MOTOR, "1 thrust", 1, True)
+_GPS = Unit("SENSOR_GPS", dialect.FAILURE_UNIT_SENSOR_GPS, "0 or 1: position and velocity", 1, True)
+_GYRO = Unit("SENSOR_GYRO", dialect.FAILURE_UNIT_SENSOR_GYRO, "0 or 1: attitude and rates", 1, True)
+_RADIO = Unit(
+    "SYSTEM_MAVLINK_SIGNAL",
+    dialect.FAILURE_UNIT_SYSTEM_MAVLINK_SIGNAL,
+    "0 own radio; n the edge from UAV n",
+    200,
+    False,
+)
+
+UNITS = {"servo": _SERVO, "motor": _MOTOR, "gps": _GPS, "gyro": _GYRO, "radio": _RADIO}
+"""Units by our names."""
+
+
+class Meaning(NamedTuple):
+    """What one kind of failure does to a unit."""
+
+    unit: Unit
+    kind: str
+    text: str
+    sizes: tuple[str, ...] = ()
+    """Parameters that say how large it is."""
+
+
+_ACTUATOR: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "wrong": (
+        "acts as effectiveness * position + bias",
+        ("FAIL_EFF", "FAIL_BIAS", "FAIL_EFF_RATE", "FAIL_BIAS_RATE"),
+    ),
+    "off": ("effectiveness 0", ()),
+    "stuck": ("holds the deflection that it has", ()),
+    "slow": ("moves no faster than a limit", ("FAIL_SLEW",)),
+    "intermittent": (
+        "healthy for a share of each period, else as wrong",
+        ("FAIL_PERIOD", "FAIL_DUTY", "FAIL_EFF", "FAIL_BIAS"),
+    ),
+    "ok": ("repaired", ()),
+}
+_POSITION: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "wrong": (
+        "position and velocity with an offset",
+        ("FAIL_POS_N", "FAIL_POS_E", "FAIL_POS_D", "FAIL_VEL_N", "FAIL_VEL_E", "FAIL_VEL_D"),
+    ),
+    "off": ("dead reckoning: the velocity is held, the position moves with it", ()),
+    "stuck": ("position and velocity are held", ()),
+    "slow": ("updated once in a period, held in between", ("FAIL_PERIOD",)),
+    "intermittent": ("right for a share of each period, held for the rest", ("FAIL_PERIOD", "FAIL_DUTY")),
+    "ok": ("repaired", ()),
+}
+_ATTITUDE: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "wrong": (
+        "attitude and rates with an offset",
+        ("FAIL_ROLL", "FAIL_PITCH", "FAIL_YAW", "FAIL_P", "FAIL_Q", "FAIL_R"),
+    ),
+    "off": ("rates read zero, the attitude is held", ()),
+    "stuck": ("attitude and rates are held", ()),
+    "slow": ("updated once in a period, held in between", ("FAIL_PERIOD",)),
+    "intermittent": ("right for a share of each period, held for the rest", ("FAIL_PERIOD", "FAIL_DUTY")),
+    "ok": ("repaired", ()),
+}
+_LINK: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "off": ("cut; the own radio in both directions", ()),
+    "intermittent": ("records are lost", ("FAIL_LOSS", "FAIL_BURST_S", "FAIL_BURST_E", "FAIL_BURST_L")),
+    "delayed": ("records come late", ("FAIL_DELAY",)),
+    "slow": ("records come late by a random time", ("FAIL_JITTER",)),
+    "ok": ("restored", ()),
+}
+
+FAILURES = tuple(
+    Meaning(unit, kind, text, sizes)
+    for unit, kinds in ((_SERVO, _ACTUATOR), (_MOTOR, _ACTUATOR), (_GPS, _POSITION), (_GYRO, _ATTITUDE), (_RADIO, _LINK))
+    for kind, (text, sizes) in kinds.items()
+)
+"""Everything that MAV_CMD_INJECT_FAILURE can ask for; anything else is unsupported."""
+
+_BY_CODES = {(meaning.unit.code, KINDS[meaning.kind]): meaning for meaning in FAILURES}
+
+
+def meaning_of(unit: float, kind: float, instance: float) -> Meaning | None:
+    """The meaning of the first three parameters of MAV_CMD_INJECT_FAILURE; None where it is unsupported."""
+    if not all(number == number // 1 for number in (unit, kind, instance)):
+        return None  # also where one of them is nan
+    meaning = _BY_CODES.get((int(unit), int(kind)))
+    return meaning if meaning is not None and 0 <= instance <= meaning.unit.highest else None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A failure of the airframe that is to happen."""
+
+    unit: str
+    """A name in `UNITS`."""
+    kind: str
+    instance: int
+    sizes: Mapping[str, float]
+    """By the names of `AIRFRAME_SIZES`."""
