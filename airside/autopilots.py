@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.model import Model
+from ftcc.airside.modes import HOLD, MISSION
 from ftcc.airside.references import of_plant
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
+    FROM_GROUND,
     PROFILE_PARAMETERS,
     PROFILE_STATES,
     TRIGGER_COLUMNS,
@@ -28,6 +30,7 @@ from ftcc.airside.references.profiles import (
     new_profile_state,
     profile_arrays,
     refer,
+    stand,
     trigger_rows,
 )
 from ftcc.airside.scheme import Scheme
@@ -93,7 +96,7 @@ class Autopilots(NamedTuple):
     profile: NDArray[np.float64]
     """(k, 19): parameters of the leaders' profiles."""
     profile_commands: NDArray[np.float64]
-    """(k, n, 3): their commands by time; unused rows have time inf."""
+    """(k, n, 3): their commands by time; unused rows have time inf. The last `FROM_GROUND` are the ground's."""
     profile_triggers: NDArray[np.float64]
     """(k, n, 4): their commands by position, see `trigger_rows`; unused rows have position inf."""
     profile_state: NDArray[np.float64]
@@ -102,6 +105,10 @@ class Autopilots(NamedTuple):
     """(m,): which entries of its `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
     """(n,): index into ``ACTUATORS`` of each of the scheme's commands."""
+    mode: NDArray[np.int64]
+    """(k,): see `modes`."""
+    held_us: NDArray[np.int64]
+    """(k,): time spent in hold, by which the clocks of references are behind, us."""
 
 
 @functools.cache
@@ -162,7 +169,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     k = len(specs)
     values = scheme.shared_width
     profiles = [profile_arrays(spec.profile, timing.period) if spec.profile else None for spec in specs]
-    rows = max([1] + [len(pair[1]) for pair in profiles if pair])
+    rows = max([1 + FROM_GROUND] + [len(pair[1]) for pair in profiles if pair])
     commands = np.full((k, rows, 3), math.inf)
     waits = max([1] + [len(spec.profile.triggers) for spec in specs if spec.profile])
     triggers = np.full((k, waits, TRIGGER_COLUMNS), math.inf)
@@ -209,6 +216,8 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             profile_state=states,
             leader_shares=np.array(shares + [-1] * (values - len(shares)), np.int64),
             actuator=np.array([ACTUATORS.index(name) for name in scheme.commands], np.int64),
+            mode=np.full(k, MISSION),
+            held_us=np.zeros(k, np.int64),
         ),
         inbox,
     )
@@ -256,8 +265,14 @@ def lead(autopilots, inbox, i, now_us, period_us):
     reference = autopilots.reference[i]
     triggers = autopilots.profile_triggers[i]
     state = autopilots.profile_state[i]
-    seen = _position_of(autopilots, inbox, i, armed(triggers, state))
-    refer(autopilots.profile[i], autopilots.profile_commands[i], triggers, state, reference, seen, now_us, period_us)
+    if autopilots.mode[i] == HOLD:
+        autopilots.held_us[i] += period_us
+        stand(state, reference, period_us)
+    else:
+        commands = autopilots.profile_commands[i]
+        seen = _position_of(autopilots, inbox, i, armed(triggers, state))
+        clock = now_us - autopilots.held_us[i]
+        refer(autopilots.profile[i], commands, triggers, state, reference, seen, clock, period_us)
     target = autopilots.target[i]
     target[0] = now_us / 1e6
     target[1], target[2], target[3] = reference[0], autopilots.offset[i], reference[3]

@@ -17,6 +17,7 @@ from ftcc.link.compiled import width
 from ftcc.link.graph import Assumption, Graph
 
 __all__ = [
+    "FAULT_TOLERANCE",
     "Flight",
     "Heard",
     "Problem",
@@ -26,6 +27,10 @@ __all__ = [
     "SchemeError",
     "quantities",
 ]
+
+
+FAULT_TOLERANCE = "fault_tolerance"
+"""The switch that the ground may throw in flight; a scheme without it has nothing to switch off."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
+from ftcc.airside.scheme import Flight
 from ftcc.link.channel import Channel
 
 __all__ = ["AutopilotSpec", "LinkEvent", "Neighbour", "OwnReference"]
@@ -69,6 +70,10 @@ class AutopilotSpec:
     """Lateral position, m."""
     hearers: tuple[int, ...] = field(default=())
     """Ids of those who hear this UAV."""
+    tolerant_gains: tuple[float, ...] = ()
+    """The same with fault tolerance on, where ``gains`` has it off."""
+    flight: Flight | None = None
+    """What the scheme's conditions on gains are checked against, also in flight; None: they are not."""
 
     def edge_from(self, sender: int) -> int:
         """Index of the in-edge from a neighbour.

@@ -12,6 +12,7 @@ from typing import Any
 from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
+from ftcc.airside.modes import HOLD
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import hear
@@ -34,6 +35,7 @@ _share = scheme.share
 _Reference = references.Reference
 _refer = references.refer
 _STATES = width(_State)
+_stand = references.stand
 _COMMANDS = len(scheme.COMMANDS)
 
 REFUSAL = ""
@@ -45,7 +47,7 @@ _LARGEST = 1e30
 
 @compiled
 def _heard(autopilots, inbox, i):
-    n = inbox.degree[i]
+    n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
     return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
 
 
@@ -74,9 +76,13 @@ else:
 
 @compiled
 def refer(autopilots, i, now_us, period_us):
-    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick."""
+    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick. In hold it, and its clock, stand still."""
+    if autopilots.mode[i] == HOLD:
+        autopilots.held_us[i] += period_us
+        _stand(autopilots.reference[i])
+        return
     parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
-    _refer(parameters, commands, autopilots.reference[i], now_us, period_us)
+    _refer(parameters, commands, autopilots.reference[i], now_us - autopilots.held_us[i], period_us)
 
 
 @compiled

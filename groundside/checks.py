@@ -265,14 +265,16 @@ def level_trim(
         return dict.fromkeys(("alpha", *plant.ACTUATORS), math.nan)
 
 
-def gains_of(scenario: Scenario, scheme: Scheme, findings: Findings) -> dict[int, Any]:
+def gains_of(
+    scenario: Scenario, scheme: Scheme, findings: Findings, switches: Mapping[str, bool] | None = None
+) -> dict[int, Any]:
     """Each UAV's ``Gains``: of the form, of the scenario, its own, and what switches that are off change.
 
-    Empty if they are refused.
+    ``switches`` are the scenario's unless given. Empty if they are refused.
     """
     plan = scenario.plan
     switched: dict[str, float] = {}
-    for name, on in plan.switches.items():
+    for name, on in (plan.switches if switches is None else switches).items():
         if name not in scheme.switches:
             findings.refuse(
                 f"switches.{name}: scheme {scheme.name} has no such switch; it has {', '.join(scheme.switches)}"
@@ -305,8 +307,8 @@ def check_scheme(
     vehicles: list[VehicleSpec],
     profiles: dict[int, Profile],
     findings: Findings,
-) -> None:
-    """The scheme's own conditions on gains and mission; each follower's gains must meet them."""
+) -> Flight:
+    """The scheme's own conditions on gains and mission, which is returned; each follower's gains must meet them."""
     speeds = {p.V for p in profiles.values()}
     speeds |= {command.speed for p in profiles.values() for command in p.commands}
     speeds |= {trigger.speed for p in profiles.values() for trigger in p.triggers}
@@ -339,6 +341,7 @@ def check_scheme(
             findings.refuse(who + problem.text)
         else:
             findings.warned.append(who + problem.text)
+    return flight
 
 
 def _motion(state: Any) -> Reference:

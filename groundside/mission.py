@@ -113,8 +113,10 @@ def resolve(scenario: Scenario) -> Mission:
     check_faults(plan, plant, vehicles, findings)
 
     gains = gains_of(scenario, scheme, findings)
+    flight = None
     if gains:
-        check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
+        flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
+    tolerant = gains_of(scenario, scheme, findings, plan.switches | {FAULT_TOLERANCE: True}) if gains else {}
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, graph, channel, findings.refuse)
     check_delays(plan, timing, findings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from collections.abc import Sequence
 from typing import Any
@@ -17,6 +18,7 @@ __all__ = [
     "SIMULATOR",
     "STATION",
     "Endpoint",
+    "as_typed",
     "command_message",
     "dialect",
     "ending_message",
@@ -237,6 +239,11 @@ def float_array(stamp_us: int, name: str, values: Sequence[float]) -> Any:
     """Up to 58 numbers as DEBUG_FLOAT_ARRAY; what no message may carry (nan, beyond float32) is sent as 0."""
     data = [value if abs(value) < _LARGEST else 0.0 for value in values]
     return dialect.MAVLink_debug_float_array_message(stamp_us, name.encode(), 0, data + [0.0] * (58 - len(data)))
+
+
+def as_typed(value: float) -> float:
+    """The shortest decimal number that float32 stores as ``value``: 0.7 for what arrives as 0.699999988."""
+    return float(str(np.float32(value))) if math.isfinite(value) else value
 
 
 def status_text(severity: int, text: str) -> Any:

@@ -13,7 +13,7 @@ from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.link_events import LinkEvents
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.link.channel import Inbox
+from ftcc.link.channel import Channel, Inbox
 from ftcc.link.gate import Said
 from ftcc.link.mavlink import Endpoint
 from ftcc.link.process import Setting
@@ -70,6 +70,14 @@ class Seat:
     """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
     failures_enabled: int = 1
     """Parameter SYS_FAILURE_EN."""
+    fault_tolerance: bool = True
+    """Parameter FTCC_FT."""
+    started: bool = False
+    """Whether there has been a tick."""
+
+    def __post_init__(self) -> None:
+        self.channel: Channel = self.spec.channel
+        """Parameters CH_*: quality of the edges by which this UAV hears, where nothing has failed."""
 
     @property
     def leader(self) -> bool:
@@ -85,9 +93,6 @@ class Seat:
     def next_us(self) -> int:
         """Simulated time of the next tick, the earliest at which anything can act."""
         return self.now_us + self.setting.timing.period_us if self.started else 0
-
-    started: bool = False
-    """Whether there has been a tick."""
 
     def note(self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None) -> None:
         """Have something logged and shown on the ground."""

@@ -2,7 +2,7 @@
 
 The latter is chosen by the scheme's ``PLANT``: the module of that name declares the NamedTuple ``Reference`` and the
 compiled ``refer(parameters, commands, reference, now_us, period_us)``, which brings a UAV's row of references to the
-tick at ``now_us`` and is called once at every tick. ``parameters`` (n,) and ``commands`` (m, c), rows with their time
+tick at ``now_us`` and is called once at every tick, and ``stand(reference)``, which is called instead in hold. ``parameters`` (n,) and ``commands`` (m, c), rows with their time
 (s) first, are those of `ftcc.airside.spec.OwnReference`; a row whose time is inf is unused.
 """
 

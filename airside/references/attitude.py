@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled, fields
 
-__all__ = ["Command", "Filter", "Reference", "refer"]
+__all__ = ["Command", "Filter", "Reference", "refer", "stand"]
 
 
 class Reference(NamedTuple):
@@ -65,3 +65,10 @@ def refer(parameters, commands, reference, now_us, period_us):
             error = commands[latest, 1 + axis] - reference[axis]
             reference[3 + axis] += h * a.frequency * (a.frequency * error - 2.0 * a.damping * reference[3 + axis])
             reference[axis] += h * reference[3 + axis]
+
+
+@compiled
+def stand(reference):
+    """Hold: keep the attitude."""
+    for axis in range(3):
+        reference[3 + axis] = 0.0

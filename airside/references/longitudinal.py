@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Reference", "refer"]
+__all__ = ["Reference", "refer", "stand"]
 
 
 class Reference(NamedTuple):
@@ -31,3 +31,8 @@ class Reference(NamedTuple):
 @compiled
 def refer(parameters, commands, reference, now_us, period_us):
     """Constants stay what they are."""
+
+
+@compiled
+def stand(reference):
+    """They do so in hold, too."""

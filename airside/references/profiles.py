@@ -21,6 +21,7 @@ from ftcc.link.compiled import compiled
 
 __all__ = [
     "CLAMPED",
+    "FROM_GROUND",
     "PROFILE_PARAMETERS",
     "PROFILE_STATES",
     "TRIGGER_COLUMNS",
@@ -30,12 +31,16 @@ __all__ = [
     "SpeedWave",
     "Trigger",
     "armed",
+    "climb_of_step",
+    "command_from_ground",
     "largest_acceleration",
     "largest_climb",
     "new_profile_state",
     "profile_arrays",
     "refer",
+    "release_from_ground",
     "sampled",
+    "stand",
     "trigger_rows",
 ]
 
@@ -114,6 +119,9 @@ CLAMPED = 6
 """Column of the state: 1 while the climb rate is held at the profile's limit."""
 PROFILE_STATES = 7
 
+FROM_GROUND = 4
+"""The last rows of a profile's commands: what the ground has asked for, in order of time; it overrules all others."""
+
 TRIGGER_COLUMNS = 4
 """In-edge of the watched leader (-1: this one itself), forward position, altitude, speed."""
 
@@ -122,7 +130,10 @@ _ROUNDING = 1e-6
 
 
 def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The profile as the compiled functions want it: parameters (19,) and commands (n, 3) with rows (at, z, V)."""
+    """The profile as the compiled functions want it: parameters (19,) and commands (n, 3) with rows (at, z, V).
+
+    The last `FROM_GROUND` rows are free.
+    """
     parameters = np.zeros(PROFILE_PARAMETERS)
     for start, (frequency, damping) in (
         (_Z_PHI, profile.altitude_filter),
@@ -143,7 +154,7 @@ def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64]
         parameters[_WAVE_FREQUENCY] = profile.speed_wave.frequency
     parameters[_CLIMB_LIMIT] = profile.climb_limit
     rows = [(-math.inf, profile.z, profile.V)] + [(c.at, c.altitude, c.speed) for c in profile.commands]
-    return parameters, np.array(rows)
+    return parameters, np.array(rows + [(math.inf, math.inf, math.inf)] * FROM_GROUND)
 
 
 def trigger_rows(profile: Profile, uav: int, senders: Sequence[int]) -> NDArray[np.float64]:
@@ -179,13 +190,13 @@ def armed(triggers, state):  # type: ignore[no-untyped-def]
 
 @compiled
 def _command(commands, triggers, state, time):  # type: ignore[no-untyped-def]
-    fired = int(state[_FIRED])
-    if fired > 0:
-        return triggers[fired - 1, 2], triggers[fired - 1, 3]
     latest = 0
     for n in range(commands.shape[0]):
         if commands[n, 0] <= time:
             latest = n
+    fired = int(state[_FIRED])
+    if fired > 0 and latest < commands.shape[0] - FROM_GROUND:
+        return triggers[fired - 1, 2], triggers[fired - 1, 3]
     return commands[latest, 1], commands[latest, 2]
 
 
@@ -269,6 +280,59 @@ def refer(parameters, commands, triggers, state, reference, seen, now_us, period
     reference[1], reference[2] = V, V_dot
     reference[3], reference[4], reference[5] = z, z_dot, z_ddot
     reference[6] = x_dot
+
+
+@compiled
+def stand(state, reference, period_us):  # type: ignore[no-untyped-def]
+    """Hold: fly on level at the present altitude and speed; to be called instead of `refer`."""
+    state[_X] += reference[6] * period_us / 1e6
+    reference[0] = state[_X]
+    reference[2], reference[4], reference[5] = 0.0, 0.0, 0.0
+    reference[6] = reference[1]
+
+
+def command_from_ground(
+    commands: NDArray[np.float64],
+    triggers: NDArray[np.float64],
+    state: NDArray[np.float64],
+    now: float,
+    at: float,
+    altitude: float | None,
+    speed: float | None,
+) -> bool:
+    """From ``at`` on (s, not before ``now``) go to this altitude (m) and speed (m/s); None: that in force by then.
+
+    Overrules the profile's own commands for good. Returns False where too many are waiting.
+    """
+    rows = commands[-FROM_GROUND:]
+    own = [row.copy() for row in rows if row[0] < math.inf]
+    in_force = [row for row in own if row[0] <= now][-1:]
+    waiting = [row for row in own if now < row[0] < at]
+    before = (in_force + waiting)[-1][1:] if in_force + waiting else _command(commands, triggers, state, at)
+    new = np.array([at, before[0] if altitude is None else altitude, before[1] if speed is None else speed])
+    kept = [*in_force, *waiting, new, *(row for row in own if row[0] > max(now, at))]
+    if len(kept) > FROM_GROUND:
+        return False
+    rows[:] = math.inf
+    rows[: len(kept)] = kept
+    return True
+
+
+def release_from_ground(commands: NDArray[np.float64]) -> None:
+    """The profile's own commands are in force again."""
+    commands[-FROM_GROUND:] = math.inf
+
+
+def climb_of_step(altitude_filter: tuple[float, float], step: float) -> float:
+    """Largest climb rate (m/s) of the altitude filter (rad/s, damping) at a step of the commanded altitude (m)."""
+    frequency, damping = altitude_filter
+    if damping < 1.0:
+        root = math.sqrt(1.0 - damping * damping)
+        return abs(step) * frequency * math.exp(-damping * math.acos(damping) / root)
+    if damping == 1.0:
+        return abs(step) * frequency / math.e
+    root = math.sqrt(damping * damping - 1.0)
+    return abs(step) * frequency * math.exp(-damping * math.acosh(damping) / root)
 
 
 def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> dict[int, Any]:

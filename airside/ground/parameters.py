@@ -1,0 +1,222 @@
+"""The parameters of an autopilot: what the ground may read and set, each with its range and what setting it does.
+
+Values in force are float64. A value that comes as float32 and rounds to the one in force leaves it as it is; a new one
+is taken as the shortest decimal number that float32 stores so, which is what was typed: 0.7, not 0.699999988.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ftcc.airside.ground.seat import Seat
+from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
+from ftcc.link.channel import Channel
+from ftcc.link.failures import SIZES, Size
+from ftcc.link.mavlink import as_typed, dialect
+
+__all__ = ["NAME_LENGTH", "Parameter", "Parameters", "Refused"]
+
+NAME_LENGTH = 16
+"""Characters of a parameter's name, at most."""
+
+_INTEGER = dialect.MAV_PARAM_TYPE_INT32
+_FLOAT = dialect.MAV_PARAM_TYPE_REAL32
+_ANY = 1e30
+_CHANNEL = {
+    "CH_LOSS": ("loss", 1.0, "probability that a record is lost"),
+    "CH_BURST_S": ("burst_start", 1.0, "probability per record of entering a burst of losses"),
+    "CH_BURST_E": ("burst_end", 1.0, "probability per record of leaving it"),
+    "CH_BURST_L": ("burst_loss", 1.0, "probability of loss within a burst"),
+    "CH_DELAY": ("delay", 1e2, "delay beyond the link latency, s"),
+    "CH_JITTER": ("jitter", 1e2, "further delay, uniform in [0, jitter], s"),
+}
+"""Quality of all edges by which a UAV hears: field of `Channel`, largest value, meaning."""
+_MOST_PERIODS = 30
+"""Latency, delay and jitter together in exchange periods: the inbox keeps that many records."""
+
+
+class Refused(ValueError):
+    """A value that a parameter cannot have; the text says why."""
+
+
+@dataclass
+class Parameter:
+    """One parameter."""
+
+    name: str
+    read: Callable[[], float]
+    write: Callable[[float], None]
+    """Brings a value into force, or raises `Refused`."""
+    low: float
+    high: float
+    integer: bool = False
+    meaning: str = ""
+
+
+class Parameters:
+    """All parameters of one autopilot, in a fixed order."""
+
+    def __init__(self, seat: Seat, rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> None:
+        self._seat = seat
+        seat.sizes.update({size.name: size.default for size in SIZES if size.name not in seat.sizes})
+        own = [*_system(seat), *_sizes(seat), *_channel(seat), *_rates(rate_of, set_rate), *_gains(seat)]
+        self._all = sorted(own, key=lambda parameter: parameter.name)
+        self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def find(self, name: str, index: int) -> int | None:
+        """Place of the parameter with this index, or, if that is negative, with this name in any case of letters."""
+        if index >= 0:
+            return index if index < len(self._all) else None
+        return self._index.get(name.upper())
+
+    def name(self, n: int) -> str:
+        """Name of the parameter in place ``n``."""
+        return self._all[n].name
+
+    def value(self, n: int) -> float:
+        """Its value in force."""
+        return self._all[n].read()
+
+    def message(self, n: int) -> Any:
+        """PARAM_VALUE with the value in force, integers byte for byte in the float."""
+        parameter = self._all[n]
+        value = parameter.read()
+        if parameter.integer:
+            value = struct.unpack("<f", struct.pack("<i", int(value)))[0]
+        kind = _INTEGER if parameter.integer else _FLOAT
+        return dialect.MAVLink_param_value_message(parameter.name.encode(), value, kind, len(self._all), n)
+
+    def set(self, n: int, raw: float, kind: int) -> bool:
+        """Set the parameter in place ``n`` as PARAM_SET has it; whether that changed anything.
+
+        Raises
+        ------
+        Refused
+            With the reason; the value in force stays.
+        """
+        parameter = self._all[n]
+        if kind != (_INTEGER if parameter.integer else _FLOAT):
+            raise Refused(f"{parameter.name} is {'an integer' if parameter.integer else 'a float'}")
+        if parameter.integer:
+            # Packing a float keeps the bits of a nan here, which is all that such an integer is.
+            value = float(struct.unpack("<i", struct.pack("<f", raw))[0])
+        else:
+            value = as_typed(raw)
+        if not math.isfinite(value):
+            raise Refused(f"{parameter.name}: must be a finite number")
+        if not parameter.low <= value <= parameter.high:
+            raise Refused(f"{parameter.name} {value:g}: {parameter.low:g} to {parameter.high:g}")
+        before = parameter.read()
+        if value == before or (not parameter.integer and np.float32(value) == np.float32(before)):
+            return False
+        parameter.write(value)
+        return True
+
+
+def _attribute(seat: Seat, name: str, parameter: str, low: float, high: float, meaning: str) -> Parameter:
+    return Parameter(
+        parameter,
+        lambda: float(getattr(seat, name)),
+        lambda value: setattr(seat, name, int(value)),
+        low,
+        high,
+        True,
+        meaning,
+    )
+
+
+def _system(seat: Seat) -> Iterator[Parameter]:
+    yield _attribute(seat, "failures_enabled", "SYS_FAILURE_EN", 0, 1, "1: failures may be injected")
+    yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
+
+
+def _sizes(seat: Seat) -> Iterator[Parameter]:
+    def one(size: Size) -> Parameter:
+        def write(value: float) -> None:
+            seat.sizes[size.name] = value
+
+        return Parameter(
+            size.name, lambda: seat.sizes[size.name], write, size.low, size.high, meaning=f"{size.meaning}, {size.unit}"
+        )
+
+    return map(one, SIZES)
+
+
+def _channel(seat: Seat) -> Iterator[Parameter]:
+    if not seat.spec.neighbours:
+        return
+    timing = seat.setting.timing
+
+    def one(name: str, field: str, high: float, meaning: str) -> Parameter:
+        def write(value: float) -> None:
+            asked = seat.channel._replace(**{field: value})
+            total = timing.latency_us / 1e6 + asked.delay + asked.jitter
+            if total > _MOST_PERIODS * timing.exchange_us / 1e6:
+                raise Refused(f"{name} {value:g}: {total:g} s is over {_MOST_PERIODS} exchange periods")
+            seat.channel = asked
+            seat.inbox.quality[seat.i, : seat.inbox.degree[seat.i], Channel._fields.index(field)] = value
+
+        return Parameter(name, lambda: float(getattr(seat.channel, field)), write, 0.0, high, meaning=meaning)
+
+    for name, (field, high, meaning) in _CHANNEL.items():
+        yield one(name, field, high, meaning)
+
+
+def _rates(rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> Iterator[Parameter]:
+    def one(n: int, name: str) -> Parameter:
+        return Parameter(
+            f"SR_{name}", lambda: rate_of(n), lambda value: set_rate(n, value), 0.0, 1000.0, meaning="Hz, 0: silent"
+        )
+
+    return (one(n, stream.name) for n, stream in enumerate(STREAMS))
+
+
+def _gains(seat: Seat) -> Iterator[Parameter]:
+    """The scheme's gains. MAVProxy knows names in capitals only: so they are announced, in so far as they differ."""
+    if seat.leader:
+        return
+    names = seat.scheme.gains_type._fields
+    switch = seat.scheme.switches.get(FAULT_TOLERANCE, {})
+    given = dict(zip(names, seat.spec.tolerant_gains or seat.spec.gains, strict=True))
+    """Gains with fault tolerance on."""
+
+    def bring_into_force(gains: dict[str, float], tolerant: bool) -> None:
+        in_force = seat.scheme.gains_type(**(gains | ({} if tolerant else switch)))
+        if seat.spec.flight is not None:
+            fatal = [p.text for p in seat.scheme.check(in_force, seat.spec.flight) if p.fatal]
+            if fatal:
+                raise Refused(fatal[0])
+        seat.autopilots.gains[seat.i] = in_force
+
+    def gain(name: str, announced: str, meaning: str) -> Parameter:
+        def write(value: float) -> None:
+            bring_into_force(given | {name: value}, seat.fault_tolerance)
+            given[name] = value
+
+        return Parameter(announced, lambda: given[name], write, -_ANY, _ANY, meaning=meaning)
+
+    capitals = [name.upper() for name in names]
+    for name, note in quantities(seat.scheme.gains_type).items():
+        announced = name.upper() if capitals.count(name.upper()) == 1 else name
+        yield gain(name, announced, f"{note.meaning}, {note.unit}")
+
+    if switch:
+        seat.fault_tolerance = not seat.spec.tolerant_gains
+
+        def set_tolerance(value: float) -> None:
+            bring_into_force(given, bool(value))
+            seat.fault_tolerance = bool(value)
+
+        yield Parameter(
+            "FTCC_FT", lambda: float(seat.fault_tolerance), set_tolerance, 0, 1, True, "1: fault tolerance on"
+        )
