@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Model", "airspeed_model", "clip", "flight_path_model", "pitch_rate_model"]
+__all__ = ["Model", "airspeed_model", "clip", "flight_path_model", "level_deflections", "pitch_rate_model"]
 
 
 class Model(NamedTuple):
@@ -68,3 +68,11 @@ def pitch_rate_model(V, alpha, q, divisor, a):
     moment = 0.5 * a.rho * V * V * a.S * a.c / a.Iy
     drift = moment * (a.Cm0 + a.Cma * alpha + a.Cmq * a.c * q / (2.0 * divisor))
     return drift, moment * a.Cmde
+
+
+def level_deflections(V: float, a: Model) -> dict[str, float]:
+    """What thrust (N) and elevator (rad) level flight at airspeed ``V`` (m/s) needs, by the nominal model."""
+    lifting = 0.5 * a.rho * max(V, 1.0) ** 2 * a.S
+    alpha = (a.m * a.g / lifting - a.CL0) / a.CLa
+    drag = lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha)
+    return {"thrust": drag / math.cos(alpha), "elevator": -(a.Cm0 + a.Cma * alpha) / a.Cmde}

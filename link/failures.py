@@ -6,15 +6,14 @@ and the navigation solution that it sends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ftcc.link.codec import dialect
+from ftcc.link.mavlink import SIMULATOR, as_typed, dialect, float_array
 
 __all__ = [
     "AIRFRAME_SIZES",
-    "DEFAULTS",
     "EVERY",
     "FAILURES",
     "KINDS",
@@ -25,7 +24,9 @@ __all__ = [
     "Meaning",
     "Size",
     "Unit",
+    "failure_messages",
     "meaning_of",
+    "read_failure",
 ]
 
 KINDS = {
@@ -55,6 +56,8 @@ class Size(NamedTuple):
 
 
 _ANY = 1e6
+_SIZES_ARRAY = "failure"
+"""Name of the DEBUG_FLOAT_ARRAY in which an autopilot tells its vehicle the sizes."""
 
 AIRFRAME_SIZES = (
     Size("FAIL_EFF", 0.5, 0.0, 1.0, "-", "remaining effectiveness of an actuator"),
@@ -90,7 +93,6 @@ LINK_SIZES = (
 """The columns of `Channel`, but for ``blocked``, in their order."""
 
 SIZES = (*AIRFRAME_SIZES, *LINK_SIZES)
-DEFAULTS = {size.name: size.default for size in SIZES}
 
 
 @dataclass(frozen=True)
@@ -106,12 +108,17 @@ class Unit:
     """Largest instance; 0 stands for all of them."""
     on_board: bool
     """The airframe's, to be answered by the vehicle; otherwise the radio's, the autopilot's own affair."""
+    parts: tuple[str, ...] = ()
+    """Actuators, the first of which is instance 1."""
+    all_parts: str = ""
+    """What instance 0 is called."""
 
 
-_SERVO = Unit("SYSTEM_SERVO", dialect.FAILURE_UNIT_SYSTEM_SERVO, "1 aileron, 2 elevator, 3 rudder; 0 all", 3, True)
-_MOTOR = Unit("SYSTEM_MOTOR", dialect.FAILURE_UNIT_SYSTEM_MOTOR, "1 thrust", 1, True)
-_GPS = Unit("SENSOR_GPS", dialect.FAILURE_UNIT_SENSOR_GPS, "0 or 1: position and velocity", 1, True)
-_GYRO = Unit("SENSOR_GYRO", dialect.FAILURE_UNIT_SENSOR_GYRO, "0 or 1: attitude and rates", 1, True)
+_SURFACES = ("aileron", "elevator", "rudder")
+_SERVO = Unit("SYSTEM_SERVO", dialect.FAILURE_UNIT_SYSTEM_SERVO, "1 aileron, 2 elevator, 3 rudder; 0 all", 3, True, _SURFACES, "surfaces")
+_MOTOR = Unit("SYSTEM_MOTOR", dialect.FAILURE_UNIT_SYSTEM_MOTOR, "1 thrust", 1, True, ("thrust",), "thrust")
+_GPS = Unit("SENSOR_GPS", dialect.FAILURE_UNIT_SENSOR_GPS, "0 or 1: position and velocity", 1, True, (), "position")
+_GYRO = Unit("SENSOR_GYRO", dialect.FAILURE_UNIT_SENSOR_GYRO, "0 or 1: attitude and rates", 1, True, (), "attitude")
 _RADIO = Unit(
     "SYSTEM_MAVLINK_SIGNAL",
     dialect.FAILURE_UNIT_SYSTEM_MAVLINK_SIGNAL,
@@ -200,9 +207,41 @@ def meaning_of(unit: float, kind: float, instance: float) -> Meaning | None:
 class Failure:
     """A failure of the airframe that is to happen."""
 
-    unit: str
-    """A name in `UNITS`."""
-    kind: str
+    meaning: Meaning
     instance: int
     sizes: Mapping[str, float]
     """By the names of `AIRFRAME_SIZES`."""
+
+
+def failure_messages(uav: int, meaning: Meaning, instance: int, at_us: int, sizes: Sequence[float]) -> tuple[Any, Any]:
+    """What an autopilot tells its vehicle: the sizes and the simulated time (0 = at once), then the command."""
+    told = float_array(at_us, _SIZES_ARRAY, sizes)
+    command = dialect.MAVLink_command_long_message(
+        uav,
+        SIMULATOR,
+        dialect.MAV_CMD_INJECT_FAILURE,
+        0,
+        meaning.unit.code,
+        KINDS[meaning.kind],
+        instance,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    return told, command
+
+
+def read_failure(messages: Sequence[Any]) -> tuple[Failure | None, int]:
+    """The inverse of `failure_messages`, from the beginning of ``messages``: the failure, and its time in us."""
+    if len(messages) < 2:
+        return None, 0
+    told, command = messages[0], messages[1]
+    if told.get_type() != "DEBUG_FLOAT_ARRAY" or command.get_type() != "COMMAND_LONG":
+        return None, 0
+    meaning = meaning_of(command.param1, command.param2, command.param3)
+    if told.name.rstrip("\0") != _SIZES_ARRAY or command.command != dialect.MAV_CMD_INJECT_FAILURE or meaning is None:
+        return None, 0
+    names = [size.name for size in AIRFRAME_SIZES]
+    sizes = dict(zip(names, map(as_typed, told.data), strict=False))
+    return Failure(meaning, int(command.param3), sizes), int(told.time_usec)

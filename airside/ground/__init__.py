@@ -1,0 +1,9 @@
+"""What an autopilot is to the ground: a MAVLink vehicle that tells, answers and obeys."""
+
+from __future__ import annotations
+
+from ftcc.airside.ground.link import GroundLink
+from ftcc.airside.ground.seat import Home, Seat
+from ftcc.airside.ground.streams import LINK_FIELDS
+
+__all__ = ["LINK_FIELDS", "GroundLink", "Home", "Seat"]

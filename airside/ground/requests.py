@@ -1,0 +1,154 @@
+"""What else a ground station says beside commands: parameters, an empty mission, time; each answered or refused."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from ftcc.airside.ground.commands import read_request, set_mode
+from ftcc.airside.ground.modes import mode_of
+from ftcc.airside.ground.parameters import Refused
+from ftcc.link.mavlink import dialect
+
+if TYPE_CHECKING:
+    from ftcc.airside.ground.link import GroundLink
+    from ftcc.link.ground import Peer
+
+__all__ = ["CHANGING", "MESSAGES"]
+
+_M = dialect
+_FTP_NAK = 129
+_FTP_UNKNOWN_COMMAND = 7
+
+
+def _parameter_list(link: GroundLink, peer: Peer, message: Any) -> None:
+    peer.send(*(link.parameters.message(n) for n in range(len(link.parameters))))
+
+
+def _not_there(peer: Peer, message: Any) -> None:
+    error = _M.MAV_PARAM_ERROR_DOES_NOT_EXIST
+    index = getattr(message, "param_index", -1)
+    peer.send(
+        _M.MAVLink_param_error_message(
+            message.get_srcSystem(), message.get_srcComponent(), message.param_id.encode(), index, error
+        )
+    )
+
+
+def _parameter_read(link: GroundLink, peer: Peer, message: Any) -> None:
+    n = link.parameters.find(message.param_id, message.param_index)
+    if n is None:
+        _not_there(peer, message)
+    else:
+        peer.send(link.parameters.message(n))
+
+
+def _parameter_set(link: GroundLink, peer: Peer, message: Any) -> None:
+    """Answered with the value in force, whatever becomes of the one asked for."""
+    n = link.parameters.find(message.param_id, -1)
+    who = f"{message.get_srcSystem()}/{message.get_srcComponent()}"
+    if n is None:
+        _not_there(peer, message)
+        return
+    name, before = link.parameters.name(n), link.parameters.value(n)
+    try:
+        changed = link.parameters.set(n, message.param_value, message.param_type)
+    except Refused as refusal:
+        link.text(_M.MAV_SEVERITY_WARNING, str(refusal), peer)
+        link.seat.note(f"parameter {name} refused: {refusal}", "warning", who, "denied")
+        peer.send(link.parameters.message(n))
+        return
+    if changed:
+        text = f"parameter {name} = {link.parameters.value(n):g} (was {before:g})"
+        link.seat.note(text, "info", who, "accepted")
+    answer = link.parameters.message(n)
+    for other in link.peers:
+        if changed or other is peer:
+            other.send(answer)
+    if peer not in link.peers:
+        peer.send(answer)
+
+
+def _command(link: GroundLink, peer: Peer, message: Any) -> None:
+    confirmation = getattr(message, "confirmation", 0)
+    link.obey(read_request(message, peer), repeated=confirmation > 0)
+
+
+def _set_mode(link: GroundLink, peer: Peer, message: Any) -> None:
+    """SET_MODE, which nothing answers but the next HEARTBEAT."""
+    mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
+    if mode is not None:
+        answer = set_mode(link, mode)
+        if answer.event:
+            link.seat.note(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
+
+
+def _mission_list(link: GroundLink, peer: Peer, message: Any) -> None:
+    kind = message.mission_type
+    peer.send(_M.MAVLink_mission_count_message(message.get_srcSystem(), message.get_srcComponent(), 0, kind))
+
+
+def _mission_answer(result: int) -> Callable[[GroundLink, Peer, Any], None]:
+    def handle(link: GroundLink, peer: Peer, message: Any) -> None:
+        kind = message.mission_type
+        peer.send(_M.MAVLink_mission_ack_message(message.get_srcSystem(), message.get_srcComponent(), result, kind))
+
+    return handle
+
+
+def _mission_upload(link: GroundLink, peer: Peer, message: Any) -> None:
+    """An empty mission is what we have; any other is refused: the scenario is the mission."""
+    result = _M.MAV_MISSION_ACCEPTED if message.count == 0 else _M.MAV_MISSION_UNSUPPORTED
+    _mission_answer(result)(link, peer, message)
+
+
+def _timesync(link: GroundLink, peer: Peer, message: Any) -> None:
+    if message.tc1 == 0:
+        peer.send(_M.MAVLink_timesync_message(time.time_ns(), message.ts1))
+
+
+def _files(link: GroundLink, peer: Peer, message: Any) -> None:
+    """MAVLink FTP: there are no files; every request but an answer of somebody else is refused."""
+    payload = list(message.payload)
+    if payload[3] >= 128:
+        return
+    answer = [0] * 251
+    sequence = (payload[0] | payload[1] << 8) + 1
+    answer[0], answer[1], answer[2] = sequence & 0xFF, sequence >> 8 & 0xFF, payload[2]
+    answer[3], answer[4], answer[5], answer[12] = _FTP_NAK, 1, payload[3], _FTP_UNKNOWN_COMMAND
+    peer.send(
+        _M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer)
+    )
+
+
+def _logs(link: GroundLink, peer: Peer, message: Any) -> None:
+    peer.send(_M.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+
+def _target(link: GroundLink, peer: Peer, message: Any) -> None:
+    link.offboard.take(message)
+
+
+MESSAGES: dict[str, Callable[[Any, Any, Any], None]] = {
+    "COMMAND_LONG": _command,
+    "COMMAND_INT": _command,
+    "PARAM_REQUEST_LIST": _parameter_list,
+    "PARAM_REQUEST_READ": _parameter_read,
+    "PARAM_SET": _parameter_set,
+    "SET_MODE": _set_mode,
+    "MISSION_REQUEST_LIST": _mission_list,
+    "MISSION_REQUEST": _mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE),
+    "MISSION_REQUEST_INT": _mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE),
+    "MISSION_COUNT": _mission_upload,
+    "MISSION_CLEAR_ALL": _mission_answer(_M.MAV_MISSION_ACCEPTED),
+    "TIMESYNC": _timesync,
+    "FILE_TRANSFER_PROTOCOL": _files,
+    "LOG_REQUEST_LIST": _logs,
+    "SET_ATTITUDE_TARGET": _target,
+    "SET_POSITION_TARGET_LOCAL_NED": _target,
+}
+"""What is done with a message; any other is for somebody else."""
+
+CHANGING = frozenset({"COMMAND_LONG", "COMMAND_INT", "PARAM_SET", "SET_MODE"})
+"""Those that may change the state of the UAV, beside targets, which are out of date in a moment."""
