@@ -38,7 +38,7 @@ from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
-from ftcc.link.compiled import compiled, copy, instantiate, refusal, uncompile, width
+from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
 from ftcc.link.timing import Timing
 
 __all__ = [

@@ -15,11 +15,12 @@ from types import ModuleType
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, LinkEvents, build, link_events, sense_all, set_links, tick_of
+from ftcc.airside.autopilots import Autopilots, build, sense_all, tick_of
+from ftcc.airside.ground import GroundLink, Seat
+from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.airside.telemetry import Reporter
 from ftcc.link.channel import Inbox, admit
 from ftcc.link.gate import Ended, Gate, Ready, Said
 from ftcc.link.mavlink import (
@@ -40,6 +41,8 @@ __all__ = ["Crew", "columns", "load_compiled", "run"]
 
 _POLL = 0.001
 """Wall time between two looks at the mesh while a record or a greeting is awaited, s."""
+_LOOK = 0.1
+"""Longest wall time between two looks at what the ground waits for, s."""
 
 
 def columns(scheme: str) -> tuple[Column, ...]:
@@ -107,20 +110,39 @@ class Crew:
             Endpoint(spec.uav, AUTOPILOT, port.autopilot, (LOOPBACK, port.vehicle))
             for spec, port in zip(specs, ports, strict=True)
         ]
-        self.reporters = [Reporter(spec, port.ground, setting.station) for spec, port in zip(specs, ports, strict=True)]
         self.parts = {
             i: PartWriter(setting.folder / "parts" / f"{spec.uav}-autopilot.arrows", columns(spec.scheme))
             for i, spec in enumerate(specs)
             if spec.role == "follower"
         }
         self.neighbourhood = Neighbourhood(specs, setting, gate)
-        self.telemetry = [Telemetry(self.timing) for _ in specs]
+        self.flushing = Telemetry(self.timing)
         self.stall = Stall()
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
         for i, vehicle in enumerate(self.vehicles):
             self.waiter.add(vehicle, functools.partial(self.listen, i))
+        self.ground = [GroundLink(self.seat(i)) for i in range(k)]
+        for link in self.ground:
+            for socket in link.sockets:
+                self.waiter.add(socket, functools.partial(link.listen, socket))
         load_compiled(self.autopilots, self.inbox, self.events, self.law)
+
+    def seat(self, i: int) -> Seat:
+        """What the ground may see and touch of autopilot ``i``."""
+        return Seat(
+            spec=self.specs[i],
+            i=i,
+            setting=self.setting,
+            scheme=find(self.specs[i].scheme),
+            autopilots=self.autopilots,
+            inbox=self.inbox,
+            events=self.events,
+            message=self.messages[i],
+            controls=self.controls[i],
+            vehicle=self.vehicles[i],
+            tell=self.gate.tell,
+        )
 
     def meet(self) -> None:
         """Wait until all who hear this process's UAVs have subscribed."""
@@ -142,6 +164,11 @@ class Crew:
             self.end(i)
         for part in self.parts.values():
             part.close()
+        for spec, link in zip(self.specs, self.ground, strict=True):
+            dropped = {reason: count for reason, count in link.dropped().items() if count}
+            if dropped:
+                listed = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items())
+                self.gate.tell(Said("info", f"dropped what came from the ground: {listed}", spec.uav))
         flown = int(self.done.max()) + 1
         self.gate.tell(Ended(flown, 0, flown * len(self.specs)))
         self.gate.wait_until_released(60.0)
@@ -160,7 +187,8 @@ class Crew:
         """Each autopilot works on the states of its vehicle as they arrive."""
         one = np.zeros_like(self.alive)
         while self.alive.any() and not self.gate.stopping:
-            self.waiter.wait(0.2)
+            self.waiter.wait(_LOOK)
+            self.attend()
             self.neighbourhood.take()
             for i in range(len(self.specs)):
                 while self.alive[i] and self.states[i]:
@@ -269,12 +297,10 @@ class Crew:
                 continue
             if i in self.parts and tick % self.timing.record_every == 0:
                 self.parts[i].row((now / 1e6, self.specs[i].uav, *self.autopilots.signals[i]))
-            if self.telemetry[i].due(tick):
-                if self.telemetry[i].heartbeat_due():
-                    self.reporters[i].heartbeat()
-                self.reporters[i].report(now, self.messages[i], self.autopilots, self.inbox, self.events, i)
-                if i in self.parts:
-                    self.parts[i].flush_if_due()
+            self.ground[i].report(now)
+        if self.flushing.due(tick):
+            for part in self.parts.values():
+                part.flush_if_due()
 
     # What surrounds the tick.
 
@@ -288,6 +314,8 @@ class Crew:
         while messages:
             if ends(messages[0]):
                 self.ending.add(i)
+            elif messages[0].get_type() == "COMMAND_ACK":
+                self.ground[i].failures.vehicle_answered(messages[0])
             state, controls = np.zeros(13), np.zeros(4)
             stamp, used = read_state(messages, state, controls)
             messages = messages[used:]
@@ -303,6 +331,7 @@ class Crew:
         self.stall.progress()
         sent = time.monotonic()
         while not self.gate.stopping:
+            self.attend()
             missing = self.missing_state() or self.neighbourhood.missing(tick, _those(self.alive))
             if not missing:
                 return True
@@ -318,6 +347,11 @@ class Crew:
                 elif self.stall.long:
                     self.gate.tell(Said("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {missing}"))
         return False
+
+    def attend(self) -> None:
+        """What the ground waits for, whether the swarm flies or is held."""
+        for link in self.ground:
+            link.attend()
 
     @property
     def names(self) -> str:
@@ -350,12 +384,13 @@ class Crew:
             tick = int(self.done[i])
             last = Record(self.specs[i].uav, max(tick, 0), self.now_us(max(tick, 0)), (), last=True)
             self.neighbourhood.publish(last)
+            self.ground[i].end()
 
     def close(self) -> None:
         """Free the ports; leave the mesh."""
         for vehicle in self.vehicles:
             vehicle.close()
-        for reporter in self.reporters:
-            reporter.close()
+        for link in self.ground:
+            link.close()
         self.neighbourhood.close()
         self.waiter.close()

@@ -76,7 +76,7 @@ else:
 
 @compiled
 def refer(autopilots, i, now_us, period_us):
-    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick. In hold it, and its clock, stand still."""
+    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick. In hold it stands still."""
     if autopilots.mode[i] == HOLD:
         autopilots.held_us[i] += period_us
         _stand(autopilots.reference[i])

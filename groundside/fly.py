@@ -8,16 +8,17 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.launcher import Outcome, Swarm
+from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.registry import Control, Entry
 from ftcc.groundside.snapshot import Event
-from ftcc.groundside.station import Station
 from ftcc.link.actuators import in_slots
+from ftcc.link.ground import LISTENERS, Address
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
 from ftcc.sim.plants import find
@@ -49,6 +50,10 @@ class FlightOptions:
     open_browser: bool = False
     record_view: bool = True
     """Write ``swarm.rrd``."""
+    listeners: tuple[Address, ...] = LISTENERS
+    """Where other ground stations may listen."""
+    key: Path | None = None
+    """Key file for signed links to the ground."""
 
 
 @dataclass
@@ -57,7 +62,7 @@ class _Flight:
 
     mission: Mission
     swarm: Swarm
-    station: Station
+    station: Monitor
     dashboard: Any
     log: EventLog
     say: Callable[[Event], None]
@@ -66,8 +71,9 @@ class _Flight:
 
     def note(self, event: Event) -> None:
         """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
-        stamped = event if event.t >= 0.0 else Event(self.station.t, event.severity, event.text, event.uav)
-        self.log.write(stamped.t, stamped.text, stamped.uav, stamped.severity)
+        stamped = event if event.t >= 0.0 else replace(event, t=self.station.t)
+        more = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
+        self.log.write(stamped.t, stamped.text, stamped.uav, stamped.severity, **more)
         self.station.note(stamped)
         self.say(stamped)
 
@@ -126,13 +132,16 @@ def fly(
         speed=options.speed,
         pack=options.pack,
         held=options.held,
+        listeners=options.listeners,
+        key=options.key,
         on_event=on_event,
     )
     # The fork server must exist before this process opens anything.
     swarm.start()
     signals = [signal_.name for signal_ in mission.scheme.signals]
     uavs = [spec.uav for spec in mission.vehicles]
-    station = Station(ports.station, uavs, mission.plant, signals, folder / "telemetry.tlog")
+    sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
+    station = Monitor(ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog")
     log = EventLog(folder / "events.jsonl")
     flight = _Flight(mission, swarm, station, None, log, say)
     control = None

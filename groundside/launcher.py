@@ -113,6 +113,8 @@ class Swarm:
     speed : simulated seconds per second in real time.
     pack : vehicles per process.
     held : stay at the first tick until `resume`.
+    listeners : where other ground stations may listen.
+    key : key file for signed links to the ground.
     on_event : called with everything worth showing.
     """
 
@@ -126,6 +128,8 @@ class Swarm:
         speed: float = 1.0,
         pack: int = 1,
         held: bool = False,
+        listeners: tuple[tuple[str, int], ...] = (),
+        key: Path | None = None,
         on_event: Callable[[Event], None],
     ) -> None:
         self.mission = mission
@@ -147,6 +151,9 @@ class Swarm:
             peer_of={uav: group[0] for group in groups for uav in group},
             station=ports.station,
             folder=folder,
+            listeners=listeners,
+            key=key,
+            home=mission.home,
         )
         self.groups = groups
 
@@ -244,8 +251,8 @@ class Swarm:
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"aircraft lost: {reason}", uav))
-            case Said(severity, text, uav, at_us):
-                self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav))
+            case Said(severity, text, uav, at_us, who, outcome):
+                self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 
     def _bury(self, child: Child) -> None:
         """A process is gone: say so, end its partner, and let nobody wait for it."""

@@ -12,7 +12,7 @@ import tomli_w
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
-from ftcc.airside.scheme import Scheme
+from ftcc.airside.scheme import FAULT_TOLERANCE, Scheme
 from ftcc.airside.spec import AutopilotSpec, Neighbour
 from ftcc.groundside.checks import (
     IDEAL,
@@ -74,6 +74,8 @@ class Mission:
     warnings: tuple[str, ...]
     toml: str
     """The merged scenario as flown, with seed and versions: flies the same flight again."""
+    home: tuple[float, float, float]
+    """Latitude, longitude (deg) and altitude (m) of the origin of the local frame."""
     events: tuple[tuple[float, int | None, str], ...]
     """What is planned to happen: time s, UAV (None: everybody), text."""
 
@@ -116,7 +118,9 @@ def resolve(scenario: Scenario) -> Mission:
     flight = None
     if gains:
         flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
-    tolerant = gains_of(scenario, scheme, findings, plan.switches | {FAULT_TOLERANCE: True}) if gains else {}
+    tolerant = gains
+    if plan.switches.get(FAULT_TOLERANCE) is False:
+        tolerant = gains_of(scenario, scheme, findings, plan.switches | {FAULT_TOLERANCE: True})
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, graph, channel, findings.refuse)
     check_delays(plan, timing, findings)
@@ -139,6 +143,8 @@ def resolve(scenario: Scenario) -> Mission:
             role="leader" if vehicle.uav in graph.leaders else "follower",
             scheme=scheme.name,
             gains=tuple(gains[vehicle.uav]),
+            tolerant_gains=tuple(tolerant[vehicle.uav]) if tolerant[vehicle.uav] != gains[vehicle.uav] else (),
+            flight=flight,
             model=model,
             command=vehicle.command,
             travel=vehicle.travel,
@@ -169,6 +175,7 @@ def resolve(scenario: Scenario) -> Mission:
         claims=tuple(claim for claim in plan.claims if scenario.case in claim.expected),
         warnings=tuple(findings.warned),
         toml=_as_flown(scenario),
+        home=(plan.home.latitude, plan.home.longitude, plan.home.altitude),
         events=_planned(plan, plant),
     )
 

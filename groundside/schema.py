@@ -409,6 +409,14 @@ class FaultFields(Strict):
     without_trim: bool = Field(False, description="true: fly it although it leaves no level trim")
 
 
+class HomeFields(Strict):
+    """Where on earth the origin of the local frame lies, for the maps of ground stations."""
+
+    latitude: float = Field(47.3977, ge=-85.0, le=85.0, description="deg")
+    longitude: float = Field(8.5456, ge=-180.0, le=180.0, description="deg")
+    altitude: float = Field(0.0, ge=-500.0, le=9000.0, description="m above mean sea level at z = 0")
+
+
 class NoiseFields(Strict):
     """White measurement noise: standard deviation of each channel at every sample."""
 
@@ -487,6 +495,7 @@ class Plan(Strict):
     faults: list[FaultFields] = []
     link_events: list[LinkEventFields] = []
     noise: NoiseFields = NoiseFields()
+    home: HomeFields = HomeFields()
     claims: list[Claim] = []
     flown: Flown | None = None
 

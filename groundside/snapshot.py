@@ -18,6 +18,10 @@ class Event:
     """"info", "warning" or "error"."""
     text: str
     uav: int | None = None
+    who: str = ""
+    """Who asked for it (MAVLink system/component), where somebody on the ground did."""
+    outcome: str = ""
+    """What became of that: accepted, denied, armed, acts, ..."""
 
 
 @dataclass(frozen=True)

@@ -115,7 +115,15 @@ class Unit:
 
 
 _SURFACES = ("aileron", "elevator", "rudder")
-_SERVO = Unit("SYSTEM_SERVO", dialect.FAILURE_UNIT_SYSTEM_SERVO, "1 aileron, 2 elevator, 3 rudder; 0 all", 3, True, _SURFACES, "surfaces")
+_SERVO = Unit(
+    "SYSTEM_SERVO",
+    dialect.FAILURE_UNIT_SYSTEM_SERVO,
+    "1 aileron, 2 elevator, 3 rudder; 0 all",
+    3,
+    True,
+    _SURFACES,
+    "surfaces",
+)
 _MOTOR = Unit("SYSTEM_MOTOR", dialect.FAILURE_UNIT_SYSTEM_MOTOR, "1 thrust", 1, True, ("thrust",), "thrust")
 _GPS = Unit("SENSOR_GPS", dialect.FAILURE_UNIT_SENSOR_GPS, "0 or 1: position and velocity", 1, True, (), "position")
 _GYRO = Unit("SENSOR_GYRO", dialect.FAILURE_UNIT_SENSOR_GYRO, "0 or 1: attitude and rates", 1, True, (), "attitude")
@@ -185,10 +193,10 @@ _LINK: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "ok": ("restored", ()),
 }
 
+_WHAT_FAILS = ((_SERVO, _ACTUATOR), (_MOTOR, _ACTUATOR), (_GPS, _POSITION), (_GYRO, _ATTITUDE), (_RADIO, _LINK))
+
 FAILURES = tuple(
-    Meaning(unit, kind, text, sizes)
-    for unit, kinds in ((_SERVO, _ACTUATOR), (_MOTOR, _ACTUATOR), (_GPS, _POSITION), (_GYRO, _ATTITUDE), (_RADIO, _LINK))
-    for kind, (text, sizes) in kinds.items()
+    Meaning(unit, kind, text, sizes) for unit, kinds in _WHAT_FAILS for kind, (text, sizes) in kinds.items()
 )
 """Everything that MAV_CMD_INJECT_FAILURE can ask for; anything else is unsupported."""
 

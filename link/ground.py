@@ -11,16 +11,19 @@ from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.signing import Signing
 
-__all__ = ["Address", "GroundSocket", "Peer"]
+__all__ = ["LISTENERS", "Address", "GroundSocket", "Peer"]
 
 Address = tuple[str, int]
+
+LISTENERS: tuple[Address, ...] = ((LOOPBACK, 14550), (LOOPBACK, 14540))
+"""Where ground stations and offboard programs listen by custom."""
 
 _GUESTS = 8
 """Callers that are remembered at a time."""
 _SILENCE = 10.0
 """Wall time after which a caller that says nothing is forgotten, s."""
 _REFUSED = 1.5
-"""Wall time for which an address counts as deserted after a datagram to it was refused, s: beyond the next HEARTBEAT."""
+"""Wall time for which an address counts as deserted after a refused datagram, s: beyond the next HEARTBEAT."""
 _DATAGRAMS_PER_READ = 64
 _LARGEST_DATAGRAM = 4096
 _FULL = 1200

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import socket
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,14 +65,25 @@ class Endpoint:
         Local port; 0 lets the system choose.
     peer : (host, port), optional
         With a peer the socket is connected: datagrams of others are dropped by the kernel. Without, it only receives.
+    only : collection of int, optional
+        Ports on loopback from which datagrams are read; those of others are dropped and counted.
     host : str
         Local address; loopback unless asked otherwise.
     """
 
     def __init__(
-        self, system: int, component: int, port: int, peer: tuple[str, int] | None = None, host: str = LOOPBACK
+        self,
+        system: int,
+        component: int,
+        port: int,
+        peer: tuple[str, int] | None = None,
+        only: Collection[int] | None = None,
+        host: str = LOOPBACK,
     ) -> None:
         self.codec = Codec(system, component)
+        self._only = frozenset((LOOPBACK, port) for port in only) if only is not None else None
+        self.strangers = 0
+        """Datagrams dropped because of where they came from."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.bind((host, port))
@@ -125,10 +136,13 @@ class Endpoint:
         messages: list[Any] = []
         for _ in range(datagrams):
             try:
-                datagram = self._socket.recv(_LARGEST_DATAGRAM)
+                datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
             except BlockingIOError:
                 break
             except ConnectionRefusedError:
+                continue
+            if self._only is not None and sender not in self._only:
+                self.strangers += 1
                 continue
             messages += self.codec.parse(datagram)
         return messages

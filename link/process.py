@@ -25,8 +25,6 @@ __all__ = ["RESEND", "Setting", "Stall", "Telemetry", "Waiter", "process_main"]
 
 _TELEMETRY = 0.1
 """Least period of telemetry, simulated and wall s."""
-_HEARTBEAT = 1.0
-"""Period of HEARTBEAT, wall s."""
 RESEND = 0.05
 """Wall time after which a datagram that was not answered is sent again (lockstep), s."""
 _STALL = 10.0
@@ -47,6 +45,12 @@ class Setting:
     """Port of the ground station."""
     folder: Path
     """The run's folder."""
+    listeners: tuple[tuple[str, int], ...] = ()
+    """Where other ground stations may listen; they are sent to, their ports are never bound."""
+    key: Path | None = None
+    """Key file; with it everything towards the ground is signed, and what comes from there must be."""
+    home: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the origin of the local frame lies: latitude, longitude (deg), altitude of z = 0 (m)."""
 
     @property
     def datagrams(self) -> int:
@@ -76,12 +80,11 @@ class Waiter:
 
 
 class Telemetry:
-    """When to send telemetry and heartbeats: at 10 Hz simulated or wall, whichever is slower."""
+    """When to report: at 10 Hz simulated or wall, whichever is slower."""
 
     def __init__(self, timing: Timing) -> None:
         self._every = max(1, round(_TELEMETRY / timing.period))
         self._last = -1e9
-        self._last_heartbeat = -1e9
 
     def due(self, tick: int) -> bool:
         """Whether telemetry is due at this tick."""
@@ -92,14 +95,6 @@ class Telemetry:
         if now - self._last < 0.9 * _TELEMETRY:
             return False
         self._last = now
-        return True
-
-    def heartbeat_due(self) -> bool:
-        """Whether a heartbeat is due."""
-        now = time.monotonic()
-        if now - self._last_heartbeat < _HEARTBEAT:
-            return False
-        self._last_heartbeat = now
         return True
 
 

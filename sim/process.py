@@ -116,7 +116,10 @@ class Vehicles:
             Endpoint(spec.uav, SIMULATOR, port.vehicle, (LOOPBACK, port.autopilot))
             for spec, port in zip(specs, ports, strict=True)
         ]
-        self.station = [Endpoint(spec.uav, SIMULATOR, 0, (LOOPBACK, setting.station)) for spec in specs]
+        self.station = [
+            Endpoint(spec.uav, SIMULATOR, port.truth, (LOOPBACK, setting.station))
+            for spec, port in zip(specs, ports, strict=True)
+        ]
         parts = setting.folder / "parts"
         self.parts = [PartWriter(parts / f"{s.uav}-vehicle.arrows", columns(s.plant, bool(s.obstacles))) for s in specs]
         self.telemetry = Telemetry(self.timing)

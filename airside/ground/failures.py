@@ -1,4 +1,4 @@
-"""Failures that the ground asks for: checked, passed on to the vehicle or to the radio links, and told when they act."""
+"""Failures that the ground asks for: checked, passed on to the vehicle or the radio links, told when they act."""
 
 from __future__ import annotations
 
@@ -149,9 +149,9 @@ class Failures:
         if meaning.kind == "ok":
             return self._seat.channel._replace(blocked=0.0)
         if meaning.kind == "off":
-            return Channel(*(math.nan,) * (len(Channel._fields) - 1), 1.0)
+            return Channel._make([math.nan] * len(LINK_SIZES) + [1.0])
         values = [self._seat.sizes[size.name] if size.name in meaning.sizes else math.nan for size in LINK_SIZES]
-        return Channel(*values, math.nan)
+        return Channel._make([*values, math.nan])
 
     def _text(self, meaning: Meaning, instance: int) -> str:
         if not meaning.unit.on_board:

@@ -87,7 +87,9 @@ class GroundLink:
         self._last_heartbeat = now
         self.offboard.attend()
         self._callers.forget_the_silent()
-        self._schedules = {peer: self._schedules[peer] for s in self.sockets for peer in s.peers if peer in self._schedules}
+        self._schedules = {
+            peer: self._schedules[peer] for s in self.sockets for peer in s.peers if peer in self._schedules
+        }
         beat = heartbeat(self.seat, self.seat.alive)
         for socket in self.sockets:
             for peer in socket.peers:

@@ -21,7 +21,7 @@ from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
 from ftcc.link.mavlink import as_typed, dialect
 
-__all__ = ["NAME_LENGTH", "Parameter", "Parameters", "Refused"]
+__all__ = ["NAME_LENGTH", "Parameter", "Parameters", "RefusedError"]
 
 NAME_LENGTH = 16
 """Characters of a parameter's name, at most."""
@@ -42,7 +42,7 @@ _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox keeps that many records."""
 
 
-class Refused(ValueError):
+class RefusedError(ValueError):
     """A value that a parameter cannot have; the text says why."""
 
 
@@ -53,7 +53,7 @@ class Parameter:
     name: str
     read: Callable[[], float]
     write: Callable[[float], None]
-    """Brings a value into force, or raises `Refused`."""
+    """Brings a value into force, or raises `RefusedError`."""
     low: float
     high: float
     integer: bool = False
@@ -101,21 +101,17 @@ class Parameters:
 
         Raises
         ------
-        Refused
+        RefusedError
             With the reason; the value in force stays.
         """
         parameter = self._all[n]
         if kind != (_INTEGER if parameter.integer else _FLOAT):
-            raise Refused(f"{parameter.name} is {'an integer' if parameter.integer else 'a float'}")
-        if parameter.integer:
-            # Packing a float keeps the bits of a nan here, which is all that such an integer is.
-            value = float(struct.unpack("<i", struct.pack("<f", raw))[0])
-        else:
-            value = as_typed(raw)
+            raise RefusedError(f"{parameter.name} is {'an integer' if parameter.integer else 'a float'}")
+        value = float(struct.unpack("<i", struct.pack("<f", raw))[0]) if parameter.integer else as_typed(raw)
         if not math.isfinite(value):
-            raise Refused(f"{parameter.name}: must be a finite number")
+            raise RefusedError(f"{parameter.name}: must be a finite number")
         if not parameter.low <= value <= parameter.high:
-            raise Refused(f"{parameter.name} {value:g}: {parameter.low:g} to {parameter.high:g}")
+            raise RefusedError(f"{parameter.name} {value:g}: {parameter.low:g} to {parameter.high:g}")
         before = parameter.read()
         if value == before or (not parameter.integer and np.float32(value) == np.float32(before)):
             return False
@@ -162,7 +158,7 @@ def _channel(seat: Seat) -> Iterator[Parameter]:
             asked = seat.channel._replace(**{field: value})
             total = timing.latency_us / 1e6 + asked.delay + asked.jitter
             if total > _MOST_PERIODS * timing.exchange_us / 1e6:
-                raise Refused(f"{name} {value:g}: {total:g} s is over {_MOST_PERIODS} exchange periods")
+                raise RefusedError(f"{name} {value:g}: {total:g} s is over {_MOST_PERIODS} exchange periods")
             seat.channel = asked
             seat.inbox.quality[seat.i, : seat.inbox.degree[seat.i], Channel._fields.index(field)] = value
 
@@ -195,7 +191,7 @@ def _gains(seat: Seat) -> Iterator[Parameter]:
         if seat.spec.flight is not None:
             fatal = [p.text for p in seat.scheme.check(in_force, seat.spec.flight) if p.fatal]
             if fatal:
-                raise Refused(fatal[0])
+                raise RefusedError(fatal[0])
         seat.autopilots.gains[seat.i] = in_force
 
     def gain(name: str, announced: str, meaning: str) -> Parameter:

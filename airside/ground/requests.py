@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ftcc.airside.ground.commands import read_request, set_mode
 from ftcc.airside.ground.modes import mode_of
-from ftcc.airside.ground.parameters import Refused
+from ftcc.airside.ground.parameters import RefusedError
 from ftcc.link.mavlink import dialect
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def _parameter_set(link: GroundLink, peer: Peer, message: Any) -> None:
     name, before = link.parameters.name(n), link.parameters.value(n)
     try:
         changed = link.parameters.set(n, message.param_value, message.param_type)
-    except Refused as refusal:
+    except RefusedError as refusal:
         link.text(_M.MAV_SEVERITY_WARNING, str(refusal), peer)
         link.seat.note(f"parameter {name} refused: {refusal}", "warning", who, "denied")
         peer.send(link.parameters.message(n))
@@ -117,9 +117,7 @@ def _files(link: GroundLink, peer: Peer, message: Any) -> None:
     sequence = (payload[0] | payload[1] << 8) + 1
     answer[0], answer[1], answer[2] = sequence & 0xFF, sequence >> 8 & 0xFF, payload[2]
     answer[3], answer[4], answer[5], answer[12] = _FTP_NAK, 1, payload[3], _FTP_UNKNOWN_COMMAND
-    peer.send(
-        _M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer)
-    )
+    peer.send(_M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer))
 
 
 def _logs(link: GroundLink, peer: Peer, message: Any) -> None:

@@ -94,7 +94,9 @@ class Seat:
         """Simulated time of the next tick, the earliest at which anything can act."""
         return self.now_us + self.setting.timing.period_us if self.started else 0
 
-    def note(self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None) -> None:
+    def note(
+        self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None
+    ) -> None:
         """Have something logged and shown on the ground."""
         when = self.now_us if at_us is None else at_us
         self.tell(Said(severity, text, self.spec.uav, when, who, outcome))

@@ -61,7 +61,7 @@ def _local_position(seat: Seat) -> Any:
 def _whole(value: float, bits: int, signed: bool = True) -> int:
     """The nearest integer that fits."""
     low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-    return max(low, min(high, round(value)))
+    return int(max(low, min(high, round(value))))
 
 
 def _heading(seat: Seat) -> float:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import struct
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ftcc.airside.telemetry import LINK_FIELDS
+from ftcc.airside.ground import LINK_FIELDS
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.link.actuators import in_slots
 from ftcc.link.mavlink import STATION, Endpoint
@@ -18,10 +18,7 @@ from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
 from ftcc.sim.process import truth_array
 
-__all__ = ["Station"]
-
-_SEVERITIES = ("error",) * 4 + ("warning",) * 2 + ("info",) * 2
-"""MAV_SEVERITY 0..7 in our words."""
+__all__ = ["Monitor"]
 
 
 @dataclass
@@ -36,13 +33,22 @@ class _Heard:
     """Wall time of the last HEARTBEAT (monotonic, s)."""
 
 
-class Station:
-    """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given."""
+class Monitor:
+    """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given.
+
+    It believes what comes from the ports in ``sources`` alone.
+    """
 
     def __init__(
-        self, port: int, uavs: Iterable[int], plant: str, signals: Sequence[str], log: Path | None = None
+        self,
+        port: int,
+        sources: Collection[int],
+        uavs: Iterable[int],
+        plant: str,
+        signals: Sequence[str],
+        log: Path | None = None,
     ) -> None:
-        self._endpoint = Endpoint(STATION, 1, port)
+        self._endpoint = Endpoint(STATION, 1, port, only=sources)
         self._endpoint.enlarge_buffer()
         self._uavs = {uav: _Heard() for uav in uavs}
         self._signals = signals
@@ -90,8 +96,11 @@ class Station:
                 heard.links = _links(message.data)
         elif kind == "HEARTBEAT":
             heard.heartbeat = time.monotonic()
-        elif kind == "STATUSTEXT":
-            self.note(Event(heard.t, _SEVERITIES[message.severity & 7], message.text, message.get_srcSystem()))
+
+    @property
+    def strangers(self) -> int:
+        """Datagrams that came from elsewhere."""
+        return self._endpoint.strangers
 
     @property
     def complete(self) -> bool:
