@@ -76,7 +76,7 @@ class Autopilots(NamedTuple):
     gains: NDArray[np.float64]
     """(k, n): the scheme's ``Gains``."""
     model: NDArray[np.float64]
-    """(k, 21): see `Model`."""
+    """(k, 43): see `Model`."""
     weight: NDArray[np.float64]
     """(k, n): a_ij of the in-edges."""
     leader: NDArray[np.int64]

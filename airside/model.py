@@ -1,6 +1,6 @@
 """The nominal model that a law knows: control-oriented longitudinal dynamics and the limits of its actuators.
 
-No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the monograph does.
+`attitude_model` has the rest of it. No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the monograph does.
 """
 
 from __future__ import annotations
@@ -38,6 +38,28 @@ class Model(NamedTuple):
     elevator_max: float
     lag: float
     """Bandwidth of the actuators, rad/s; 0 = none."""
+    aileron_min: float = 0.0
+    aileron_max: float = 0.0
+    rudder_min: float = 0.0
+    rudder_max: float = 0.0
+    b: float = 1.0
+    Ix: float = 1.0
+    Iz: float = 1.0
+    Ixz: float = 0.0
+    CY0: float = 0.0
+    CYb: float = 0.0
+    Cl0: float = 0.0
+    Clb: float = 0.0
+    Clda: float = 0.0
+    Cldr: float = 0.0
+    Clp: float = 0.0
+    Clr: float = 0.0
+    Cn0: float = 0.0
+    Cnb: float = 0.0
+    Cnda: float = 0.0
+    Cndr: float = 0.0
+    Cnp: float = 0.0
+    Cnr: float = 0.0
 
 
 @compiled

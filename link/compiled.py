@@ -198,13 +198,25 @@ def _fields_compiled(cls, values):
     return eval(f"lambda cls, values: kind({', '.join(made)})", {"kind": kind})
 
 
+def _rooms(record_type: Any) -> dict[int, int]:
+    """Sizes of the arrays among the fields of a tuple type, by place."""
+    if not hasattr(record_type, "_fields"):
+        return {}
+    return {n: what.size for n, (_, _, what) in enumerate(_layout(record_type)) if isinstance(what, Room)}
+
+
 def store(record: Any, values: Any) -> None:
-    """Write a tuple into the first entries of the vector ``values``; the inverse of `fields`."""
+    """Write a tuple into the first entries of the vector ``values``; the inverse of `fields`.
+
+    A number in the place of an array fills it.
+    """
+    rooms = _rooms(type(record))
     at = 0
-    for field in record:
+    for n, field in enumerate(record):
         entries = np.ravel(field)
-        values[at : at + len(entries)] = entries
-        at += len(entries)
+        size = rooms.get(n, len(entries))
+        values[at : at + size] = entries
+        at += size
 
 
 @overload(store)
@@ -216,6 +228,7 @@ def _store_compiled(record, values):
                 values[n] = record[n]
 
         return store_floats
+    rooms = _rooms(getattr(record, "instance_class", None))
     lines = ["def store_fields(record, values):", "    at = 0"]
     for n, field in enumerate(record.types):
         if isinstance(field, BaseTuple):
@@ -224,7 +237,8 @@ def _store_compiled(record, values):
         elif isinstance(field, types.Array):
             lines += [f"    for entry in record[{n}].flat:", "        values[at] = entry", "        at += 1"]
         else:
-            lines += [f"    values[at] = record[{n}]", "    at += 1"]
+            size = rooms.get(n, 1)
+            lines += [f"    for m in range({size}):", f"        values[at + m] = record[{n}]", f"    at += {size}"]
     made: dict[str, Any] = {}
     exec("\n".join(lines), made)
     return made["store_fields"]

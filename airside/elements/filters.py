@@ -11,11 +11,13 @@ from ftcc.link.compiled import compiled
 __all__ = [
     "butterworth",
     "complementary_rate",
+    "critically_damped_step",
     "first_order_rate",
     "high_gain_observer",
     "limited_tracker",
     "low_pass_step",
     "reference_shaper",
+    "robust_exact_differentiator_step",
     "second_order_reference_step",
     "sliding_mode_differentiator",
     "sliding_mode_differentiator_step",
@@ -127,6 +129,41 @@ def second_order_reference_step(value, rate, target, target_rate, w, damping, h)
     pull = w * w * (target - value) + 2.0 * damping * w * target_rate
     rate = (rate + h * pull) / (1.0 + 2.0 * damping * w * h + w * w * h * h)
     return value + h * rate, rate
+
+
+@compiled
+def critically_damped_step(value, rate, target, w, h):  # type: ignore[no-untyped-def]
+    """Second-order filter of a held ``target`` with a double pole at ``w`` (rad/s), ``h`` seconds later, exactly.
+
+    Returns
+    -------
+    value, rate after the step; not in the monograph
+    """
+    offset = value - target
+    mixed = rate + w * offset
+    decay = math.exp(-w * h)
+    return target + decay * (offset + mixed * h), decay * (rate - w * mixed * h)
+
+
+@compiled
+def robust_exact_differentiator_step(value, derivative, target, damping, cubic, bound, phi, h):  # type: ignore[no-untyped-def]
+    """One Euler step of length ``h`` of the differentiator with fast convergence from afar, eq. (7.24).
+
+    With er = value - target: value' = -damping (|er|^(1/2) + cubic |er|^(3/2)) sign(er) + derivative, and derivative'
+    = -bound (0.5 sign(er) + 2 cubic er + 1.5 cubic^2 er^2 sign(er)). Only the signs of the second line, which jump, are
+    smoothed to tanh(./phi): in the first the damping near er = 0 would vanish with them. Steps itself: the derivative
+    first, then the value with the new one.
+
+    Returns
+    -------
+    value, derivative after the step
+    """
+    error = value - target
+    size = abs(error)
+    smooth = math.tanh(error / phi)
+    root = math.sqrt(size)
+    derivative -= h * bound * ((0.5 + 1.5 * cubic * cubic * error * error) * smooth + 2.0 * cubic * error)
+    return value + h * (derivative - damping * (root + cubic * size * root) * sign(error)), derivative
 
 
 @compiled

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from ftcc.airside.elements.filters import critically_damped_step
+from ftcc.airside.elements.vectors import added, scaled, subtracted
 from ftcc.link.compiled import compiled
 
-__all__ = ["disagreement", "extrapolated", "motion_sums", "weighted_average"]
+__all__ = ["disagreement", "error_sums", "extrapolated", "filtered_error_sums", "motion_sums", "weighted_average"]
 
 
 @compiled
@@ -88,3 +90,49 @@ def motion_sums(heard, column):  # type: ignore[no-untyped-def]
             positions += weight * (heard.values[j, column] + rate * heard.age[j])
             rates += weight * rate
     return weights, positions, rates
+
+
+@compiled
+def error_sums(error, heard, oldest):  # type: ignore[no-untyped-def]
+    """sum_j a_ij, sum_j a_ij (e - e_j) and sum_j a_ij e_j' over the neighbours, eqs. (7.12), (8.10).
+
+    ``error`` is the own e of three axes; a record holds e_j and then its rate, both held between records. A neighbour
+    takes part from its first record on, while that is at most ``oldest`` seconds old; 0 = for ever.
+    """
+    weights = 0.0
+    total = (0.0, 0.0, 0.0)
+    rates = (0.0, 0.0, 0.0)
+    for j in range(heard.weight.shape[0]):
+        if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
+            weight, values = heard.weight[j], heard.values[j]
+            weights += weight
+            total = added(total, scaled(weight, subtracted(error, (values[0], values[1], values[2]))))
+            rates = added(rates, scaled(weight, (values[3], values[4], values[5])))
+    return weights, total, rates
+
+
+@compiled
+def filtered_error_sums(error, heard, memory, w, oldest, h):  # type: ignore[no-untyped-def]
+    """As `error_sums`, with each neighbour's e_j through a `critically_damped_step` of ``w`` rad/s, whose rate is e_j'.
+
+    ``memory`` (n, 7) holds a row per neighbour: 1 once heard, the filtered e_j, its rate. A filter starts at the first
+    e_j, at rest, and stands still while its neighbour is left out. To be called once every ``h`` seconds.
+    """
+    weights = 0.0
+    total = (0.0, 0.0, 0.0)
+    rates = (0.0, 0.0, 0.0)
+    for j in range(heard.weight.shape[0]):
+        if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
+            row = memory[j]
+            for axis in range(3):
+                target = heard.values[j, axis]
+                if row[0] == 0.0:
+                    row[1 + axis], row[4 + axis] = target, 0.0
+                else:
+                    row[1 + axis], row[4 + axis] = critically_damped_step(row[1 + axis], row[4 + axis], target, w, h)
+            row[0] = 1.0
+            weight = heard.weight[j]
+            weights += weight
+            total = added(total, scaled(weight, subtracted(error, (row[1], row[2], row[3]))))
+            rates = added(rates, scaled(weight, (row[4], row[5], row[6])))
+    return weights, total, rates

@@ -6,7 +6,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["limited", "rounded_power", "sign", "signed_power"]
+__all__ = ["limited", "rounded_power", "sign", "signed_power", "smooth_power"]
 
 
 @compiled
@@ -30,6 +30,12 @@ def rounded_power(value: float, exponent: float, width: float) -> tuple[float, f
         slope = math.pow(width, exponent - 1.0)
         return slope * value, slope
     return signed_power(value, exponent), exponent * math.pow(abs(value), exponent - 1.0)
+
+
+@compiled
+def smooth_power(value: float, exponent: float, phi: float) -> float:
+    """`signed_power` with the sign smoothed to tanh(./phi), eqs. (7.23), (7.37)."""
+    return math.pow(abs(value), exponent) * math.tanh(value / phi)
 
 
 @compiled

@@ -9,6 +9,7 @@ from ftcc.airside.elements.nonlinear import signed_power
 from ftcc.link.compiled import compiled
 
 __all__ = [
+    "discrete_disturbance_observer_step",
     "disturbance_observer_rate",
     "finite_time_observer",
     "reference_system_step",
@@ -25,6 +26,22 @@ def disturbance_observer_rate(gain, error, state, known, reference_rate):  # typ
     d_hat = xi + gain error obeys d_hat' = gain (d - d_hat).
     """
     return -gain * (known + state + gain * error - reference_rate)
+
+
+@compiled
+def discrete_disturbance_observer_step(estimate, disturbance, measured, explained, w, h):  # type: ignore[no-untyped-def]
+    """A sampled observer of d in x' = ``explained`` + d with both poles at exp(-w h) (not in the monograph).
+
+    A constant d is found without error, at any rate w (rad/s). Steps itself.
+
+    Returns
+    -------
+    estimate of x and of d after the step
+    """
+    pole = math.exp(-w * h)
+    error = measured - estimate
+    after = estimate + h * (explained + disturbance) + (1.0 - pole * pole) * error
+    return after, disturbance + (1.0 - pole) * (1.0 - pole) / h * error
 
 
 @compiled

@@ -7,7 +7,7 @@ import math
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
 
-__all__ = ["EDGE", "performance_transform", "performance_tube"]
+__all__ = ["EDGE", "bounded_transform", "performance_transform", "performance_tube"]
 
 EDGE = 0.98
 """The transform sees at most this share of the tube: beyond it, up to and outside of the wall, it stays finite."""
@@ -36,3 +36,21 @@ def performance_transform(error, error_rate, width, width_rate, lower, upper):  
     share_rate = (error_rate - share * width_rate) / width
     slope_rate = slope * (-width_rate / width - share_rate / (lower + share) + share_rate / (upper - share))
     return share, transformed, slope, slope_rate
+
+
+@compiled
+def bounded_transform(error, width, lower, upper, edge, continued):  # type: ignore[no-untyped-def]
+    """Transformed error and its slope, eqs. (7.20), (8.16)-(8.17), guarded beyond the share ``edge`` of the tube.
+
+    There the slope is that at the guard. With ``continued`` = 1 the transformed error goes on along it, else it stays.
+
+    Returns
+    -------
+    transformed, slope : float
+        xi and eta = d(xi)/d(error) of chapter 7; E and eta of chapter 8.
+    """
+    wanted = error / width
+    share = clip(wanted, -edge * lower, edge * upper)
+    transformed = 0.5 * math.log((lower * upper + upper * share) / (lower * upper - lower * share))
+    slope = (1.0 / (lower + share) + 1.0 / (upper - share)) / (2.0 * width)
+    return transformed + continued * (wanted - share) * width * slope, slope

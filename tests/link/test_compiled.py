@@ -182,3 +182,15 @@ def test_records_of_floats_vectors_and_arrays_lie_in_one_vector(function):
     values = np.arange(13.0)
     function(values)
     assert values.tolist() == [10, 3, 1, 2, 4, 5, 6, 7, 8, 9 + 2, 0, 11, 12]
+
+
+@compiled
+def _begun(values):
+    store(Mixed(1.0, (2.0, 3.0, 4.0), 0.0, 5.0, 6.0), values)
+
+
+@pytest.mark.parametrize("function", [_begun, getattr(_begun, "py_func", _begun)], ids=["compiled", "plain"])
+def test_a_number_in_the_place_of_an_array_fills_it(function):
+    values = np.full(14, -1.0)
+    function(values)
+    assert values.tolist() == [1, 2, 3, 4, 0, 0, 0, 0, 0, 0, 5, 6, 6, -1]

@@ -1,0 +1,69 @@
+"""Algebra of three axes on tuples: no memory, and the same bits compiled and in plain Python. Matrices are their rows."""
+
+from __future__ import annotations
+
+from ftcc.airside.model import clip
+from ftcc.link.compiled import compiled
+
+__all__ = [
+    "added",
+    "applied",
+    "applied_transposed",
+    "dot",
+    "limited_to",
+    "scaled",
+    "subtracted",
+    "times",
+]
+
+
+@compiled
+def added(a, b):
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def subtracted(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def scaled(factor, a):
+    """``factor`` (a number) times a."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@compiled
+def times(a, b):
+    """Axis by axis: diag(a) b."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+@compiled
+def dot(a, b):
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def applied(m, a):
+    """m a, for a matrix of three rows."""
+    return dot(m[0], a), dot(m[1], a), dot(m[2], a)
+
+
+@compiled
+def applied_transposed(m, a):
+    """m^T a."""
+    return (
+        m[0][0] * a[0] + m[1][0] * a[1] + m[2][0] * a[2],
+        m[0][1] * a[0] + m[1][1] * a[1] + m[2][1] * a[2],
+        m[0][2] * a[0] + m[1][2] * a[1] + m[2][2] * a[2],
+    )
+
+
+@compiled
+def limited_to(a, low, high):
+    """Each axis within its limits."""
+    return clip(a[0], low[0], high[0]), clip(a[1], low[1], high[1]), clip(a[2], low[2], high[2])

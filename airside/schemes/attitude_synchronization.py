@@ -1,0 +1,536 @@
+"""Decentralized attitude synchronization with prescribed performance.
+
+Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, chapter 7;
+equation numbers are the monograph's. Each UAV tracks its own bank, angle of attack and sideslip and stays synchronized
+with its neighbours' tracking errors, inside a decaying funnel, in spite of faults of all three surfaces and of errors
+in the aerodynamic coefficients. There is no leader.
+
+The networks' inputs, centres and widths are chosen: the monograph gives none. sign() is tanh(./phi_s). The `monograph`
+form is the printed law. Departures of the `flight` form, each a gain that the other leaves off:
+- neighbours' errors, held between messages, pass a critically damped filter whose rate replaces the sent one;
+- feed-forward of what the kinematics do not explain of the attitude's rate;
+- an observer of what the nominal model does not explain of the body rates' acceleration;
+- caps on the gains that the adaptive terms add, which sampling cannot follow;
+- less coupling of the attitude errors into the auxiliary system of the rates;
+- a lead on the surfaces' commands against their lag.
+
+The differentiator is integrated in sub-steps over the tick behind, with its input ramped from sample to sample.
+`dynamic_surface` = 1 is the traditional law that the monograph compares with: a first-order filter, and neither funnel
+nor adaptive, auxiliary or finite-time terms.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.attitude_model import (
+    body_rate_model,
+    deflections_for,
+    kinematics,
+    kinematics_inverse,
+    largest_deflections,
+    least_deflections,
+)
+from ftcc.airside.conditions import positive
+from ftcc.airside.elements.filters import (
+    butterworth,
+    robust_exact_differentiator_step,
+)
+from ftcc.airside.elements.neighbours import error_sums, filtered_error_sums
+from ftcc.airside.elements.networks import adaptation_rate, diagonal_energy, grid_axis_energy, learned_gain
+from ftcc.airside.elements.nonlinear import smooth_power
+from ftcc.airside.elements.observers import discrete_disturbance_observer_step
+from ftcc.airside.elements.performance import bounded_transform, performance_tube
+from ftcc.airside.elements.vectors import (
+    added,
+    applied,
+    applied_transposed,
+    dot,
+    limited_to,
+    scaled,
+    subtracted,
+    times,
+)
+from ftcc.airside.flight_path import Own
+from ftcc.airside.model import Model, clip
+from ftcc.airside.references.attitude import Reference
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
+from ftcc.link.compiled import Room, Vector, compiled
+from ftcc.link.graph import Assumption
+
+__all__ = ["Gains", "Output", "State", "check", "observe", "share", "start", "step"]
+
+Q = Quantity
+
+MOST_NEIGHBOURS = 16
+"""Neighbours whose errors a UAV can filter."""
+
+
+class Gains(NamedTuple):
+    """Design parameters, then switches (0 or 1) and settings of the additions."""
+
+    lambda1: Annotated[float, Q("lambda_1", "-", "own tracking error", 1.2)]
+    lambda2: Annotated[float, Q("lambda_2", "-", "differences to the neighbours' errors", 1.0)]
+    k_up: Annotated[float, Q("k_up", "-", "upper wall of the funnel", 1.1)]
+    k_lo: Annotated[float, Q("k_lo", "-", "lower wall of the funnel", 1.1)]
+    eps0: Annotated[float, Q("eps_0", "rad", "funnel at the start", 0.4)]
+    eps_inf: Annotated[float, Q("eps_inf", "rad", "funnel at the end", 0.15)]
+    nu: Annotated[float, Q("nu", "1/s", "decay of the funnel", 0.5)]
+    k11_mu: Annotated[float, Q("K11", "1/s", "transformed error, bank", 3.0)]
+    k11_alpha: Annotated[float, Q("K11", "1/s", "transformed error, alpha", 5.0)]
+    k11_beta: Annotated[float, Q("K11", "1/s", "transformed error, sideslip", 1.5)]
+    k12_mu: Annotated[float, Q("K12", "1/s", "finite-time term, bank", 0.5)]
+    k12_alpha: Annotated[float, Q("K12", "1/s", "finite-time term, alpha", 0.25)]
+    k12_beta: Annotated[float, Q("K12", "1/s", "finite-time term, sideslip", 0.2)]
+    k21_p: Annotated[float, Q("K21", "1/s", "roll-rate error", 10.0)]
+    k21_q: Annotated[float, Q("K21", "1/s", "pitch-rate error", 15.0)]
+    k21_r: Annotated[float, Q("K21", "1/s", "yaw-rate error", 8.0)]
+    k22_p: Annotated[float, Q("K22", "rad/s^2", "finite-time term, roll rate", 0.3)]
+    k22_q: Annotated[float, Q("K22", "rad/s^2", "finite-time term, pitch rate", 2.5)]
+    k22_r: Annotated[float, Q("K22", "rad/s^2", "finite-time term, yaw rate", 0.2)]
+    upsilon: Annotated[float, Q("upsilon", "-", "exponent of the finite-time terms", 0.6)]
+    h11: Annotated[float, Q("h11", "-", "scale of the first network", 2.5)]
+    h12: Annotated[float, Q("h12", "-", "damping of the transformed error", 1.2)]
+    h13: Annotated[float, Q("h13", "-", "differentiator, damping", 63.25)]
+    h14: Annotated[float, Q("h14", "-", "differentiator, convergence from afar", 1.0)]
+    h15: Annotated[float, Q("h15", "rad/s^3", "differentiator, bound of the second derivative", 2000.0)]
+    h21: Annotated[float, Q("h21", "-", "scale of the second network", 2.0)]
+    h22: Annotated[float, Q("h22", "-", "damping of the rate error", 1.3)]
+    tau1: Annotated[float, Q("tau_1", "-", "sliding term of the first auxiliary system", 0.2)]
+    tau2: Annotated[float, Q("tau_2", "rad/s^2", "sliding term of the second auxiliary system", 0.2)]
+    k13: Annotated[float, Q("k13", "-", "adaptation of Theta_1, 0: off", 30.0)]
+    k14: Annotated[float, Q("k14", "1/s", "leak of Theta_1", 0.05)]
+    k23: Annotated[float, Q("k23", "-", "adaptation of Theta_2, 0: off", 30.0)]
+    k24: Annotated[float, Q("k24", "1/s", "leak of Theta_2", 0.08)]
+    phi_s: Annotated[float, Q("phi_s", "-", "boundary layer of sign() (chosen)", 0.002)]
+    w_u: Annotated[float, Q("w_u", "rad/s", "low-pass of the command, input of the second network (chosen)", 20.0)]
+    thrust: Annotated[float, Q("T", "N", "thrust, held: trim at 30 m/s (chosen)", 21.3032)]
+    substeps: Annotated[float, Q("N", "-", "Euler steps per tick", 5.0)]
+    edge: Annotated[
+        float, Q("edge", "-", "share of the funnel beyond which the transform is linear (not in paper)", 0.98)
+    ]
+    neighbour_filter: Annotated[float, Q("w_f", "rad/s", "filter of neighbours, 0: none (not in paper)", 0.0)]
+    oldest: Annotated[float, Q("oldest", "s", "age at which a neighbour is dropped, 0: held (not in paper)", 0.0)]
+    feed_forward: Annotated[float, Q("feed_forward", "-", "1: kinematic feed-forward (not in paper)", 0.0)]
+    observer: Annotated[float, Q("w_d", "rad/s", "observer of the body rates, 0: none (not in paper)", 0.0)]
+    cap1: Annotated[float, Q("cap_1", "1/s", "largest added gain on attitude, 0: any (not in paper)", 0.0)]
+    cap2: Annotated[float, Q("cap_2", "1/s", "largest added gain on rates, 0: any (not in paper)", 0.0)]
+    k_zeta: Annotated[float, Q("k_zeta", "-", "coupling into the second auxiliary system (not in paper)", 1.0)]
+    lag: Annotated[float, Q("lag", "rad/s", "surfaces' bandwidth that lead and observer assume, 0: none", 0.0)]
+    dynamic_surface: Annotated[float, Q("dynamic_surface", "-", "1: the traditional law", 0.0)]
+
+
+class State(NamedTuple):
+    """Internal states of one UAV."""
+
+    t: Annotated[float, Q("t", "s", "time of the last tick")]
+    began: Annotated[float, Q("t_0", "s", "time of the first tick")]
+    ticks: Annotated[float, Q("k", "-", "ticks done")]
+    e: Annotated[Vector, Q("e", "rad", "tracking error of the last tick")]
+    e_dot: Annotated[Vector, Q("e_dot", "rad/s", "its filtered rate")]
+    F1: Annotated[Vector, Q("F1_hat", "rad/s", "kinematic feed-forward")]
+    x2_bar: Annotated[Vector, Q("X2_bar", "rad/s", "virtual rate command of the last tick")]
+    x2_d: Annotated[Vector, Q("X2_d", "rad/s", "differentiator: its value")]
+    w: Annotated[Vector, Q("w", "rad/s^2", "differentiator: its rate")]
+    z1: Annotated[Vector, Q("z_1", "-", "auxiliary system of the attitude")]
+    z2: Annotated[Vector, Q("z_2", "rad/s", "auxiliary system of the rates")]
+    theta1: Annotated[float, Q("Theta_1", "-", "squared norm of the first network's weights")]
+    theta2: Annotated[float, Q("Theta_2", "-", "squared norm of the second network's weights")]
+    u: Annotated[Vector, Q("U", "rad", "command of the last tick before the lead")]
+    acting: Annotated[Vector, Q("U_act", "rad", "modelled position of the surfaces")]
+    u_f: Annotated[Vector, Q("U_f", "rad", "low-passed command")]
+    u_f_dot: Annotated[Vector, Q("U_f_dot", "rad/s", "its rate")]
+    x2_hat: Annotated[Vector, Q("X2_hat", "rad/s", "observer of the body rates")]
+    d: Annotated[Vector, Q("d_hat", "rad/s^2", "unexplained acceleration")]
+    neighbours: Annotated[
+        NDArray[np.float64],
+        Q("e_j", "rad, rad/s", "per neighbour: heard before, filtered error and its rate"),
+        Room((MOST_NEIGHBOURS, 7)),
+    ]
+
+
+class Output(NamedTuple):
+    """Commands first, then what else one evaluation of the law shows."""
+
+    aileron: float
+    elevator: float
+    rudder: float
+    thrust: float
+    E: Vector
+    """Synchronization error, rad."""
+    eps: float
+    """Funnel, rad."""
+    F1: Vector
+    x2_bar: Vector
+    d: Vector
+    wanted: Vector
+    """Deflections before the limits, rad."""
+
+
+SHARED = {
+    "follower": (
+        Q("mu_error", "rad", "tracking error, bank"),
+        Q("alpha_error", "rad", "tracking error, angle of attack"),
+        Q("beta_error", "rad", "tracking error, sideslip"),
+        Q("mu_error_rate", "rad/s", "used without a neighbour filter only"),
+        Q("alpha_error_rate", "rad/s", "used without a neighbour filter only"),
+        Q("beta_error_rate", "rad/s", "used without a neighbour filter only"),
+    ),
+    "leader": (),
+}
+SIGNALS = (
+    Q("mu_d", "rad", "reference, bank"),
+    Q("alpha_d", "rad", "reference, angle of attack"),
+    Q("beta_d", "rad", "reference, sideslip"),
+    Q("E_mu", "rad", "synchronization error, bank", bound="wall"),
+    Q("E_alpha", "rad", "synchronization error, angle of attack", bound="wall"),
+    Q("E_beta", "rad", "synchronization error, sideslip", bound="wall"),
+    Q("wall", "rad", "upper wall of the funnel"),
+    Q("p_d", "rad/s", "differentiated rate command, roll"),
+    Q("q_d", "rad/s", "differentiated rate command, pitch"),
+    Q("r_d", "rad/s", "differentiated rate command, yaw"),
+    Q("theta1", "-", "squared norm of the first network's weights"),
+    Q("theta2", "-", "squared norm of the second network's weights"),
+    Q("d_p", "rad/s^2", "unexplained roll acceleration"),
+    Q("d_q", "rad/s^2", "unexplained pitch acceleration"),
+    Q("d_r", "rad/s^2", "unexplained yaw acceleration"),
+    Q("aileron_wanted", "rad", "aileron before its limits"),
+    Q("elevator_wanted", "rad", "elevator before its limits"),
+    Q("rudder_wanted", "rad", "rudder before its limits"),
+)
+GRAPH = Assumption.CONNECTED_UNDIRECTED
+COMMANDS = ("aileron", "elevator", "rudder", "thrust")
+PLANT = "attitude"
+FORMS = {
+    "monograph": {},
+    "flight": {
+        "phi_s": 0.01,
+        "substeps": 10.0,
+        "edge": 0.9,
+        "neighbour_filter": 10.0,
+        "feed_forward": 1.0,
+        "observer": 40.0,
+        "cap1": 10.0,
+        "cap2": 30.0,
+        "k_zeta": 0.3,
+        "lag": 20.0,
+    },
+}
+SWITCHES = {
+    "fault_tolerance": {"k13": 0.0, "k23": 0.0, "feed_forward": 0.0, "observer": 0.0},
+    "adaptation": {"k13": 0.0, "k23": 0.0},
+}
+
+_LEAST_AIRSPEED = 3.0
+"""Airspeed guard, m/s."""
+_LARGEST_SIDESLIP = math.radians(80.0)
+"""Sideslip guard in the kinematics, rad."""
+_RATE_FILTER = 0.02
+"""Time constant of the low-pass on the differentiated tracking error, s."""
+_FEED_FORWARD_FILTER = 0.05
+"""Time constant of the low-pass on the feed-forward, s."""
+_DYNAMIC_SURFACE = 0.05
+"""Time constant of the traditional law's filter, s."""
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@compiled
+def _tracking_error(own, reference):
+    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
+
+
+@compiled
+def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
+    """State at the first tick: the published zeros, the body rates as measured, the surfaces at their command."""
+    rates, deflections = (own.p, own.q, own.r), (own.aileron, own.elevator, own.rudder)
+    e = _tracking_error(own, reference)
+    return State(
+        t=own.t, began=own.t, ticks=0.0,
+        e=e, e_dot=_ZERO, F1=_ZERO,
+        x2_bar=_ZERO, x2_d=_ZERO, w=_ZERO,
+        z1=_ZERO, z2=_ZERO, theta1=0.0, theta2=0.0,
+        u=_ZERO, acting=deflections, u_f=_ZERO, u_f_dot=_ZERO,
+        x2_hat=rates, d=_ZERO,
+        neighbours=0.0,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+@compiled
+def _transformed(E, eps, gains):
+    """xi and eta of the three axes, eq. (7.20)."""
+    xi_mu, eta_mu = bounded_transform(E[0], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
+    xi_alpha, eta_alpha = bounded_transform(E[1], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
+    xi_beta, eta_beta = bounded_transform(E[2], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
+    return (xi_mu, xi_alpha, xi_beta), (eta_mu, eta_alpha, eta_beta)
+
+
+@compiled
+def _smooth_powers(a, gains):
+    """sig(a)^upsilon of (7.23), axis by axis."""
+    return (
+        smooth_power(a[0], gains.upsilon, gains.phi_s),
+        smooth_power(a[1], gains.upsilon, gains.phi_s),
+        smooth_power(a[2], gains.upsilon, gains.phi_s),
+    )
+
+
+@compiled
+def _smooth_signs(a, phi):
+    return math.tanh(a[0] / phi), math.tanh(a[1] / phi), math.tanh(a[2] / phi)
+
+
+@compiled
+def _capped(gain, cap):
+    return min(gain, cap) if cap > 0.0 else gain
+
+
+@compiled
+def _network_energies(own, u_f):
+    """phi'phi of the two networks, each with a constant neuron."""
+    mu, alpha, beta = clip(own.mu / 0.3, -1.5, 1.5), clip(own.alpha / 0.2, -1.5, 1.5), clip(own.beta / 0.1, -1.5, 1.5)
+    attitude = grid_axis_energy(mu, 3, 2.0) * grid_axis_energy(alpha, 3, 2.0) * grid_axis_energy(beta, 3, 2.0)
+    rates = diagonal_energy(
+        (
+            mu,
+            alpha,
+            beta,
+            clip(own.p, -1.5, 1.5),
+            clip(own.q, -1.5, 1.5),
+            clip(own.r, -1.5, 1.5),
+            clip(u_f[0] / 0.6, -1.5, 1.5),
+            clip(u_f[1] / 0.6, -1.5, 1.5),
+            clip(u_f[2] / 0.6, -1.5, 1.5),
+        ),
+        61,
+        6.0,
+    )
+    return 1.0 + attitude, 1.0 + rates
+
+
+@compiled
+def _differentiated(state, x2_bar, gains, dt):
+    """X2d and w at this tick: (7.24) from the tick before, its input on a ramp."""
+    p, q, r = state.x2_d
+    w_p, w_q, w_r = state.w
+    parts = int(gains.substeps)
+    h = dt / parts
+    a, b, c, phi = gains.h13, gains.h14, gains.h15, gains.phi_s
+    for n in range(1, parts + 1):
+        target = added(state.x2_bar, scaled(n / parts, subtracted(x2_bar, state.x2_bar)))
+        p, w_p = robust_exact_differentiator_step(p, w_p, target[0], a, b, c, phi, h)
+        q, w_q = robust_exact_differentiator_step(q, w_q, target[1], a, b, c, phi, h)
+        r, w_r = robust_exact_differentiator_step(r, w_r, target[2], a, b, c, phi, h)
+    return (p, q, r), (w_p, w_q, w_r)
+
+
+@compiled
+def _auxiliary(state, xi, eta, S2, er, phi_i, G1, energies, gains, dt):
+    """z1, z2 (7.25), (7.38) and Theta_1, Theta_2 (7.34), (7.45) a tick later, in Euler steps; the rest is held."""
+    z1, z2, theta1, theta2 = state.z1, state.z2, state.theta1, state.theta2
+    k11 = (gains.k11_mu, gains.k11_alpha, gains.k11_beta)
+    k21 = (gains.k21_p, gains.k21_q, gains.k21_r)
+    parts = int(gains.substeps)
+    h = dt / parts
+    rate_error = math.sqrt(dot(S2, S2))
+    for _ in range(parts):
+        weighted = times(subtracted(xi, z1), eta)
+        z1_rate = subtracted(times(eta, applied(G1, added(er, z2))), times(k11, z1))
+        z1_rate = scaled(phi_i, subtracted(z1_rate, scaled(gains.tau1, _smooth_signs(z1, gains.phi_s))))
+        z2_rate = subtracted(scaled(phi_i * gains.k_zeta, applied_transposed(G1, weighted)), times(k21, z2))
+        z2_rate = subtracted(z2_rate, scaled(gains.tau2, _smooth_signs(z2, gains.phi_s)))
+        error = math.sqrt(dot(weighted, weighted))
+        theta1 += h * adaptation_rate(theta1, error, energies[0], gains.h11, gains.k13, gains.k14)
+        theta2 += h * adaptation_rate(theta2, rate_error, energies[1], gains.h21, gains.k23, gains.k24)
+        z1, z2 = added(z1, scaled(h, z1_rate)), added(z2, scaled(h, z2_rate))
+    return z1, z2, theta1, theta2
+
+
+@compiled
+def _traditional(state, E, rates_sum, phi_i, reference_rate, x2, F20, G20, own, gains, dt):
+    """Dynamic surface control without funnel, networks and auxiliary systems: X2_bar, X2_d and U."""
+    k11 = (gains.k11_mu, gains.k11_alpha, gains.k11_beta)
+    k21 = (gains.k21_p, gains.k21_q, gains.k21_r)
+    wanted = added(subtracted(reference_rate, times(k11, E)), scaled(gains.lambda2 / phi_i, rates_sum))
+    x2_bar = applied(kinematics_inverse(own.alpha, own.beta), wanted)
+    x2_d = x2_bar
+    if state.ticks > 0.0:
+        x2_d = added(x2_bar, scaled(math.exp(-dt / _DYNAMIC_SURFACE), subtracted(state.x2_d, x2_bar)))
+    acceleration = subtracted(scaled(1.0 / _DYNAMIC_SURFACE, subtracted(x2_bar, x2_d)), F20)
+    acceleration = subtracted(acceleration, times(k21, subtracted(x2, x2_d)))
+    return x2_bar, x2_d, deflections_for(G20, acceleration)
+
+
+@compiled
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
+    """One tick: the state ``dt`` later, and what is commanded and seen now."""
+    first = state.ticks == 0.0
+    V = max(own.V, _LEAST_AIRSPEED)
+    beta = clip(own.beta, -_LARGEST_SIDESLIP, _LARGEST_SIDESLIP)
+    x2 = (own.p, own.q, own.r)
+    reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
+
+    # Synchronization error (7.12) and funnel (7.16), (7.20).
+    e = _tracking_error(own, reference)
+    if gains.neighbour_filter > 0.0:
+        weights, differences, rates_sum = filtered_error_sums(
+            e, heard, state.neighbours, gains.neighbour_filter, gains.oldest, dt
+        )
+    else:
+        weights, differences, rates_sum = error_sums(e, heard, gains.oldest)
+    phi_i = gains.lambda1 + gains.lambda2 * weights
+    E = added(scaled(gains.lambda1, e), scaled(gains.lambda2, differences))
+    eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.nu)
+    xi, eta = _transformed(E, eps, gains)
+
+    G1 = kinematics(own.alpha, beta)
+    F20, G20 = body_rate_model(V, own.alpha, own.beta, x2, V, model)
+
+    # What the model does not explain of the body rates.
+    acting = (own.aileron, own.elevator, own.rudder)
+    if gains.lag > 0.0:
+        acting = added(state.acting, scaled(1.0 - math.exp(-gains.lag * dt), subtracted(acting, state.acting)))
+    x2_hat, d = state.x2_hat, state.d
+    if gains.observer > 0.0 and not first:
+        explained = added(F20, applied(G20, acting))
+        p_hat, d_p = discrete_disturbance_observer_step(x2_hat[0], d[0], x2[0], explained[0], gains.observer, dt)
+        q_hat, d_q = discrete_disturbance_observer_step(x2_hat[1], d[1], x2[1], explained[1], gains.observer, dt)
+        r_hat, d_r = discrete_disturbance_observer_step(x2_hat[2], d[2], x2[2], explained[2], gains.observer, dt)
+        x2_hat, d = (p_hat, q_hat, r_hat), (d_p, d_q, d_r)
+
+    # What body rates do not explain of the attitude's rate.
+    e_dot, F1 = state.e_dot, state.F1
+    if gains.feed_forward > 0.0:
+        if not first:
+            difference = scaled(1.0 / dt, subtracted(e, state.e))
+            e_dot = added(e_dot, scaled(1.0 - math.exp(-dt / _RATE_FILTER), subtracted(difference, e_dot)))
+        seen = subtracted(added(e_dot, reference_rate), applied(G1, x2))
+        share_of_new = 1.0 if first else 1.0 - math.exp(-dt / _FEED_FORWARD_FILTER)
+        F1 = added(F1, scaled(share_of_new, subtracted(seen, F1)))
+
+    if gains.dynamic_surface > 0.0:
+        x2_bar, x2_d, wanted = _traditional(state, E, rates_sum, phi_i, reference_rate, x2, F20, G20, own, gains, dt)
+        w, z1, z2, theta1, theta2 = state.w, state.z1, state.z2, state.theta1, state.theta2
+    else:
+        energies = _network_energies(own, state.u_f)
+
+        # Virtual rate command (7.23).
+        S1 = subtracted(xi, state.z1)
+        damping = learned_gain(state.theta1, energies[0], gains.h11) + 1.0 / (2.0 * gains.h12 * gains.h12)
+        added_gain = (
+            _capped(eta[0] * eta[0] * damping, gains.cap1),
+            _capped(eta[1] * eta[1] * damping, gains.cap1),
+            _capped(eta[2] * eta[2] * damping, gains.cap1),
+        )
+        pull = added(times((gains.k11_mu, gains.k11_alpha, gains.k11_beta), xi), times(added_gain, S1))
+        pull = added(pull, times((gains.k12_mu, gains.k12_alpha, gains.k12_beta), _smooth_powers(S1, gains)))
+        wanted_rate = subtracted(reference_rate, (pull[0] / eta[0], pull[1] / eta[1], pull[2] / eta[2]))
+        wanted_rate = added(wanted_rate, scaled(gains.lambda2 / phi_i, rates_sum))
+        wanted_rate = subtracted(added(wanted_rate, scaled(eps_rate / (eps * phi_i), E)), F1)
+        x2_bar = applied(kinematics_inverse(own.alpha, beta), wanted_rate)
+
+        # Differentiator (7.24).
+        x2_d, w = state.x2_d, state.w
+        if not first:
+            x2_d, w = _differentiated(state, x2_bar, gains, dt)
+
+        # Deflections (7.37).
+        S2 = subtracted(subtracted(x2, x2_d), state.z2)
+        damping = learned_gain(state.theta2, energies[1], gains.h21) + 1.0 / (2.0 * gains.h22 * gains.h22)
+        acceleration = subtracted(
+            subtracted(w, F20), times((gains.k21_p, gains.k21_q, gains.k21_r), subtracted(x2, x2_d))
+        )
+        acceleration = subtracted(
+            acceleration, times((gains.k22_p, gains.k22_q, gains.k22_r), _smooth_powers(S2, gains))
+        )
+        acceleration = subtracted(acceleration, added(scaled(_capped(damping, gains.cap2), S2), d))
+        wanted = deflections_for(G20, acceleration)
+        z1, z2, theta1, theta2 = _auxiliary(
+            state, xi, eta, S2, subtracted(x2_d, x2_bar), phi_i, G1, energies, gains, dt
+        )
+
+    # Limits, lead, and the low-passed command that the second network sees next.
+    low, high = least_deflections(model), largest_deflections(model)
+    u = limited_to(wanted, low, high)
+    sent = u
+    if gains.lag > 0.0 and not first:
+        decay = math.exp(-gains.lag * dt)
+        sent = limited_to(added(u, scaled(decay / (1.0 - decay), subtracted(u, state.u))), low, high)
+    u_f, u_f_dot = _low_passed(state.u_f, state.u_f_dot, sent, gains.w_u, dt)
+
+    after = State(
+        t=own.t, began=state.began, ticks=state.ticks + 1.0,
+        e=e, e_dot=e_dot, F1=F1,
+        x2_bar=x2_bar, x2_d=x2_d, w=w,
+        z1=z1, z2=z2, theta1=theta1, theta2=theta2,
+        u=u, acting=acting, u_f=u_f, u_f_dot=u_f_dot,
+        x2_hat=x2_hat, d=d,
+        neighbours=state.neighbours,
+    )  # fmt: skip
+    return after, Output(sent[0], sent[1], sent[2], gains.thrust, E, eps, F1, x2_bar, d, wanted)
+
+
+@compiled
+def _low_passed(value, rate, target, w, h):
+    """(7.35) a tick later, semi-implicitly: the rate first."""
+    _, p = butterworth(value[0], rate[0], target[0], w)
+    _, q = butterworth(value[1], rate[1], target[1], w)
+    _, r = butterworth(value[2], rate[2], target[2], w)
+    rate = added(rate, scaled(h, (p, q, r)))
+    return added(value, scaled(h, rate)), rate
+
+
+@compiled
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
+    """The own tracking error, and its rate as the difference to the tick before."""
+    e = _tracking_error(own, reference)
+    since = own.t - state.t
+    e_dot = scaled(1.0 / since, subtracted(e, state.e)) if since > 0.0 else _ZERO
+    return e + e_dot
+
+
+@compiled
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
+    """`SIGNALS`."""
+    return (
+        (reference.mu, reference.alpha, reference.beta)
+        + output.E
+        + (gains.k_up * output.eps,)
+        + state.x2_d
+        + (state.theta1, state.theta2)
+        + output.d
+        + output.wanted
+    )
+
+
+def check(gains: Gains, flight: Flight) -> list[Problem]:
+    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    names = (
+        "lambda1 k_up k_lo eps0 eps_inf nu k11_mu k11_alpha k11_beta k21_p k21_q k21_r upsilon h11 h12 h13 h14 h15 h21 "
+        "h22 phi_s w_u substeps"
+    )
+    problems = positive(gains, names)
+    if not 0.0 < gains.upsilon < 1.0:
+        problems.append(Problem(True, f"gain upsilon = {gains.upsilon:g}: must lie between 0 and 1"))
+    if gains.eps0 < gains.eps_inf:
+        problems.append(
+            Problem(True, f"gain eps0 = {gains.eps0:g} rad: must not be below eps_inf = {gains.eps_inf:g} rad")
+        )
+    if not 0.0 < gains.edge < 1.0:
+        problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
+    if gains.substeps != int(gains.substeps):
+        problems.append(Problem(True, f"gain substeps = {gains.substeps:g}: must be a whole number"))
+    elif gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
+        problems.append(
+            Problem(
+                False,
+                f"gain substeps = {gains.substeps:g}: odd numbers hand the differentiator's chatter to the rudder",
+            )
+        )
+    degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
+    if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
+        problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))
+    return problems
