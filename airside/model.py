@@ -1,6 +1,7 @@
 """The nominal model that a law knows: control-oriented longitudinal dynamics and the limits of its actuators.
 
-`attitude_model` has the rest of it. No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the monograph does.
+`attitude_model` has the rest of it. No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the
+monograph does.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["adaptation_rate", "adaptation_step", "diagonal_energy", "grid_axis_energy", "learned_gain"]
+__all__ = ["adapt_neuron", "adaptation_rate", "adaptation_step", "diagonal_energy", "grid_axis_energy", "learned_gain"]
 
 
 @compiled
@@ -60,3 +60,20 @@ def adaptation_step(estimate, error, energy, scale, gain, leak, h):  # type: ign
     Steps itself, the leak implicitly: never below zero.
     """
     return (estimate + h * gain * error * error * energy / (2.0 * scale * scale)) / (1.0 + h * gain * leak)
+
+
+@compiled
+def adapt_neuron(weights, n, activation, error, gain, leak, h):  # type: ignore[no-untyped-def]
+    """One Euler step of the weights (n, 3) of a neuron of a network with three outputs, eqs. (8.27), (8.39).
+
+    W' = gain (activation error - leak W). Modifies ``weights[n]``.
+
+    Returns
+    -------
+    What the neuron adds to the network's outputs with its weights before the step.
+    """
+    row = weights[n]
+    w = (row[0], row[1], row[2])
+    for axis in range(3):
+        row[axis] += h * gain * (activation * error[axis] - leak * w[axis])
+    return activation * w[0], activation * w[1], activation * w[2]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.elements.nonlinear import sign
+from ftcc.airside.elements.vectors import added, dot, scaled, subtracted
 from ftcc.link.compiled import compiled
 
-__all__ = ["auxiliary_step", "linear_auxiliary_rate", "squared_auxiliary_step"]
+__all__ = ["auxiliary_step", "linear_auxiliary_rate", "squared_auxiliary_step", "vector_auxiliary_step"]
 
 
 @compiled
@@ -44,3 +45,17 @@ def squared_auxiliary_step(state, gain, error, excess, threshold, h):  # type: i
         state = threshold if state >= 0.0 else -threshold
     square = state * state + 2.0 * h * (excess * state - abs(error * excess) - 0.5 * excess * excess)
     return sign(state) * math.sqrt(max(threshold * threshold, square / (1.0 + 2.0 * h * gain)))
+
+
+@compiled
+def vector_auxiliary_step(state, gain, power, excess, floor, h):  # type: ignore[no-untyped-def]
+    """The state (three axes) after a step of length ``h`` of a nonlinear auxiliary system, eqs. (8.29), (8.41).
+
+    state' = -(gain + (power + 0.5 |excess|^2)/max(|state|^2, floor)) state + excess; ``power`` is the rate at which the
+    excess feeds the error's energy. The floor stands in the place of Remark 8.1's freeze and reset, which depend on the
+    sampling. Steps itself, implicitly where the state decays.
+    """
+    decay = gain + (power + 0.5 * dot(excess, excess)) / max(dot(state, state), floor)
+    if decay >= 0.0:
+        return scaled(1.0 / (1.0 + h * decay), added(state, scaled(h, excess)))
+    return added(state, scaled(h, subtracted(excess, scaled(decay, state))))

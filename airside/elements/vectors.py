@@ -1,4 +1,4 @@
-"""Algebra of three axes on tuples: no memory, and the same bits compiled and in plain Python. Matrices are their rows."""
+"""Algebra of three axes on tuples: no memory, the same bits compiled and in plain Python. Matrices are their rows."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ __all__ = [
     "applied_transposed",
     "dot",
     "limited_to",
+    "over",
     "scaled",
     "subtracted",
     "times",
@@ -39,6 +40,12 @@ def scaled(factor, a):
 def times(a, b):
     """Axis by axis: diag(a) b."""
     return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+@compiled
+def over(a, b):
+    """Axis by axis: diag(b)^-1 a."""
+    return a[0] / b[0], a[1] / b[1], a[2] / b[2]
 
 
 @compiled

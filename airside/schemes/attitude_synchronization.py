@@ -51,6 +51,7 @@ from ftcc.airside.elements.vectors import (
     applied_transposed,
     dot,
     limited_to,
+    over,
     scaled,
     subtracted,
     times,
@@ -110,9 +111,7 @@ class Gains(NamedTuple):
     w_u: Annotated[float, Q("w_u", "rad/s", "low-pass of the command, input of the second network (chosen)", 20.0)]
     thrust: Annotated[float, Q("T", "N", "thrust, held: trim at 30 m/s (chosen)", 21.3032)]
     substeps: Annotated[float, Q("N", "-", "Euler steps per tick", 5.0)]
-    edge: Annotated[
-        float, Q("edge", "-", "share of the funnel beyond which the transform is linear (not in paper)", 0.98)
-    ]
+    edge: Annotated[float, Q("edge", "-", "share of the funnel with a linear transform beyond (not in paper)", 0.98)]
     neighbour_filter: Annotated[float, Q("w_f", "rad/s", "filter of neighbours, 0: none (not in paper)", 0.0)]
     oldest: Annotated[float, Q("oldest", "s", "age at which a neighbour is dropped, 0: held (not in paper)", 0.0)]
     feed_forward: Annotated[float, Q("feed_forward", "-", "1: kinematic feed-forward (not in paper)", 0.0)]
@@ -427,7 +426,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         )
         pull = added(times((gains.k11_mu, gains.k11_alpha, gains.k11_beta), xi), times(added_gain, S1))
         pull = added(pull, times((gains.k12_mu, gains.k12_alpha, gains.k12_beta), _smooth_powers(S1, gains)))
-        wanted_rate = subtracted(reference_rate, (pull[0] / eta[0], pull[1] / eta[1], pull[2] / eta[2]))
+        wanted_rate = subtracted(reference_rate, over(pull, eta))
         wanted_rate = added(wanted_rate, scaled(gains.lambda2 / phi_i, rates_sum))
         wanted_rate = subtracted(added(wanted_rate, scaled(eps_rate / (eps * phi_i), E)), F1)
         x2_bar = applied(kinematics_inverse(own.alpha, beta), wanted_rate)
@@ -440,13 +439,10 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         # Deflections (7.37).
         S2 = subtracted(subtracted(x2, x2_d), state.z2)
         damping = learned_gain(state.theta2, energies[1], gains.h21) + 1.0 / (2.0 * gains.h22 * gains.h22)
-        acceleration = subtracted(
-            subtracted(w, F20), times((gains.k21_p, gains.k21_q, gains.k21_r), subtracted(x2, x2_d))
-        )
-        acceleration = subtracted(
-            acceleration, times((gains.k22_p, gains.k22_q, gains.k22_r), _smooth_powers(S2, gains))
-        )
-        acceleration = subtracted(acceleration, added(scaled(_capped(damping, gains.cap2), S2), d))
+        pull = added(times((gains.k21_p, gains.k21_q, gains.k21_r), subtracted(x2, x2_d)), d)
+        pull = added(pull, times((gains.k22_p, gains.k22_q, gains.k22_r), _smooth_powers(S2, gains)))
+        pull = added(pull, scaled(_capped(damping, gains.cap2), S2))
+        acceleration = subtracted(subtracted(w, F20), pull)
         wanted = deflections_for(G20, acceleration)
         z1, z2, theta1, theta2 = _auxiliary(
             state, xi, eta, S2, subtracted(x2_d, x2_bar), phi_i, G1, energies, gains, dt
@@ -496,13 +492,16 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS`."""
     return (
-        (reference.mu, reference.alpha, reference.beta)
-        + output.E
-        + (gains.k_up * output.eps,)
-        + state.x2_d
-        + (state.theta1, state.theta2)
-        + output.d
-        + output.wanted
+        reference.mu,
+        reference.alpha,
+        reference.beta,
+        *output.E,
+        gains.k_up * output.eps,
+        *state.x2_d,
+        state.theta1,
+        state.theta2,
+        *output.d,
+        *output.wanted,
     )
 
 
@@ -516,20 +515,13 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     if not 0.0 < gains.upsilon < 1.0:
         problems.append(Problem(True, f"gain upsilon = {gains.upsilon:g}: must lie between 0 and 1"))
     if gains.eps0 < gains.eps_inf:
-        problems.append(
-            Problem(True, f"gain eps0 = {gains.eps0:g} rad: must not be below eps_inf = {gains.eps_inf:g} rad")
-        )
+        problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
     if not 0.0 < gains.edge < 1.0:
         problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
     if gains.substeps != int(gains.substeps):
         problems.append(Problem(True, f"gain substeps = {gains.substeps:g}: must be a whole number"))
     elif gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
-        problems.append(
-            Problem(
-                False,
-                f"gain substeps = {gains.substeps:g}: odd numbers hand the differentiator's chatter to the rudder",
-            )
-        )
+        problems.append(Problem(False, f"gain substeps = {gains.substeps:g}: odd numbers make the rudder chatter"))
     degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
     if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
         problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))

@@ -1,0 +1,406 @@
+"""Decentralized attitude control over a directed graph.
+
+Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, chapter 8;
+equation numbers are the monograph's. Each UAV regulates a mixture of its own attitude error and of the differences to
+the errors of those whom it hears, inside a shrinking bound. Radial-basis networks and disturbance observers, one pair
+per loop, absorb unknown aerodynamics, loss of the surfaces' effectiveness and their bias. There is no leader.
+
+The chapter's table of parameters and its networks' layout are lost; those here are chosen. Departures from the print:
+- the auxiliary signal enters (8.26) as k5 mu1/eta, which the proof needs (8.46), instead of k5 mu1;
+- floored denominators in the place of the auxiliary systems' freeze and reset (Remark 8.1);
+- the error that the transform sees is limited to a share of the bound, the virtual rate command to `rate_limit`;
+- one explicit Euler step per tick, but implicit ones for the auxiliary systems and the low-passed command, and an exact
+  one for the first-order filter;
+- a neighbour whose newest record is too old is left out of the error, of its gain and of the derivatives;
+- a speed law of the thrust, without which the phugoid of the commanded angle of attack ends the flight.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.attitude_model import (
+    attitude_drift,
+    body_rate_model,
+    deflections_for,
+    kinematics,
+    kinematics_inverse,
+    largest_deflections,
+    least_deflections,
+)
+from ftcc.airside.conditions import positive, stable_in_steps
+from ftcc.airside.elements.filters import second_order_reference_step
+from ftcc.airside.elements.neighbours import error_sums
+from ftcc.airside.elements.networks import adapt_neuron
+from ftcc.airside.elements.performance import bounded_transform, performance_tube
+from ftcc.airside.elements.saturation import vector_auxiliary_step
+from ftcc.airside.elements.vectors import (
+    added,
+    applied,
+    applied_transposed,
+    dot,
+    limited_to,
+    over,
+    scaled,
+    subtracted,
+    times,
+)
+from ftcc.airside.flight_path import Own
+from ftcc.airside.model import Model, clip
+from ftcc.airside.references.attitude import Reference
+from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
+from ftcc.link.compiled import Room, Vector, compiled
+from ftcc.link.graph import Assumption
+
+__all__ = ["Gains", "Output", "State", "check", "observe", "share", "start", "step"]
+
+Q = Quantity
+
+
+class Gains(NamedTuple):
+    """Design parameters, all chosen but the bound, which is that of chapter 7; then switches (0 or 1) and guards."""
+
+    lambda1: Annotated[float, Q("lambda_1", "-", "own attitude error", 0.4)]
+    lambda2: Annotated[float, Q("lambda_2", "-", "differences to the neighbours' errors", 0.25)]
+    k_up: Annotated[float, Q("k_up", "-", "upper bound", 1.1)]
+    k_lo: Annotated[float, Q("k_lo", "-", "lower bound", 1.1)]
+    eps0: Annotated[float, Q("eps_0", "rad", "bound at the start", 0.4)]
+    eps_inf: Annotated[float, Q("eps_inf", "rad", "bound at the end", 0.15)]
+    iota: Annotated[float, Q("iota", "1/s", "decay of the bound", 0.5)]
+    k1: Annotated[float, Q("k1", "1/s", "predictor of the attitude", 20.0)]
+    k2: Annotated[float, Q("k2", "1/s", "observer of the attitude's disturbance", 1.5)]
+    k3: Annotated[float, Q("k3", "-", "prediction error of the attitude in the adaptation", 0.4)]
+    k4_mu: Annotated[float, Q("K4", "1/s", "transformed error, bank", 6.0)]
+    k4_alpha: Annotated[float, Q("K4", "1/s", "transformed error, alpha", 1.5)]
+    k4_beta: Annotated[float, Q("K4", "1/s", "transformed error, sideslip", 1.5)]
+    k5: Annotated[float, Q("k5", "1/s", "auxiliary system of the attitude", 2.0)]
+    k6: Annotated[float, Q("k6", "-", "adaptation of the first network, 0: off", 0.1)]
+    k7: Annotated[float, Q("k7", "-", "leak of the first network", 0.1)]
+    r1: Annotated[float, Q("r1", "-", "scale of the first network", 1.0)]
+    r2: Annotated[float, Q("r2", "-", "scale of the second network", 1.0)]
+    k8: Annotated[float, Q("k8", "1/s", "predictor of the rates", 12.0)]
+    k9: Annotated[float, Q("k9", "1/s", "observer of the rates' disturbance", 9.0)]
+    k10: Annotated[float, Q("k10", "-", "prediction error of the rates in the adaptation", 0.4)]
+    k11_p: Annotated[float, Q("K11", "1/s", "roll-rate error", 4.0)]
+    k11_q: Annotated[float, Q("K11", "1/s", "pitch-rate error", 7.0)]
+    k11_r: Annotated[float, Q("K11", "1/s", "yaw-rate error", 5.0)]
+    k12: Annotated[float, Q("k12", "1/s", "auxiliary system of the rates", 2.0)]
+    k13: Annotated[float, Q("k13", "-", "adaptation of the second network, 0: off", 0.5)]
+    k14: Annotated[float, Q("k14", "-", "leak of the second network", 0.1)]
+    mu1_floor: Annotated[float, Q("mu_1b", "rad^2/s^2", "floor of the first auxiliary system", 1e-4)]
+    mu2_floor: Annotated[float, Q("mu_2b", "rad^2", "floor of the second auxiliary system", 1e-4)]
+    tau: Annotated[float, Q("tau", "s", "first-order filter of the rate command", 0.04)]
+    w_u: Annotated[float, Q("w_B", "rad/s", "low-pass of the command, input of the second network", 40.0)]
+    observer1: Annotated[float, Q("observer_1", "-", "1: disturbance observer of the attitude", 1.0)]
+    observer2: Annotated[float, Q("observer_2", "-", "1: disturbance observer of the rates", 1.0)]
+    nominal: Annotated[float, Q("nominal", "-", "1: nominal model in the place of the networks", 0.0)]
+    derivatives: Annotated[float, Q("derivatives", "-", "1: neighbours' error rates are used", 1.0)]
+    oldest: Annotated[float, Q("oldest", "s", "age at which a neighbour is dropped, 0: held (not in paper)", 0.5)]
+    edge: Annotated[float, Q("edge", "-", "share of the bound that the transform sees (not in paper)", 0.95)]
+    rate_limit: Annotated[float, Q("rate_limit", "rad/s", "largest rate command (not in paper)", 10.0)]
+    thrust: Annotated[float, Q("T_0", "N", "thrust at the set speed (not in paper)", 20.0)]
+    speed: Annotated[float, Q("V_0", "m/s", "set speed (not in paper)", 24.0)]
+    k_speed: Annotated[float, Q("k_V", "N s/m", "thrust per speed error, 0: thrust held (not in paper)", 10.0)]
+
+
+class State(NamedTuple):
+    """Internal states of one UAV."""
+
+    began: Annotated[float, Q("t_0", "s", "time of the first tick")]
+    ticks: Annotated[float, Q("k", "-", "ticks done")]
+    pi1: Annotated[Vector, Q("pi_1", "rad/s", "observer of the attitude's disturbance")]
+    pi2: Annotated[Vector, Q("pi_2", "rad/s^2", "observer of the rates' disturbance")]
+    x1_hat: Annotated[Vector, Q("X1_hat", "rad", "predicted attitude")]
+    x2_hat: Annotated[Vector, Q("X2_hat", "rad/s", "predicted rates")]
+    x2_d: Annotated[Vector, Q("X2_d", "rad/s", "filtered rate command")]
+    mu1: Annotated[Vector, Q("mu_1", "rad/s", "auxiliary system of the attitude")]
+    mu2: Annotated[Vector, Q("mu_2", "rad", "auxiliary system of the rates")]
+    u_f: Annotated[Vector, Q("u_0f", "rad", "low-passed command")]
+    u_f_dot: Annotated[Vector, Q("u_0f_dot", "rad/s", "its rate")]
+    error_rate: Annotated[Vector, Q("x_tilde_dot", "rad/s", "estimated rate of the attitude error, for the neighbours")]
+    W1: Annotated[NDArray[np.float64], Q("W1", "rad/s", "weights of the first network"), Room((27, 3))]
+    W2: Annotated[NDArray[np.float64], Q("W2", "rad/s^2", "weights of the second network"), Room((17, 3))]
+
+
+class Output(NamedTuple):
+    """Commands first, then what else one evaluation of the law shows."""
+
+    aileron: float
+    elevator: float
+    rudder: float
+    thrust: float
+    e: Vector
+    """Synchronization error, rad."""
+    eps: float
+    """Bound, rad."""
+    D1: Vector
+    D2: Vector
+    W1: float
+    """Frobenius norms of the weights."""
+    W2: float
+    wanted: Vector
+    """Deflections before the limits, rad."""
+
+
+SHARED = {
+    "follower": (
+        Q("mu_error", "rad", "attitude error, bank"),
+        Q("alpha_error", "rad", "attitude error, angle of attack"),
+        Q("beta_error", "rad", "attitude error, sideslip"),
+        Q("mu_error_rate", "rad/s", "its estimated rate"),
+        Q("alpha_error_rate", "rad/s", "its estimated rate"),
+        Q("beta_error_rate", "rad/s", "its estimated rate"),
+    ),
+    "leader": (),
+}
+SIGNALS = (
+    Q("mu_d", "rad", "reference, bank"),
+    Q("alpha_d", "rad", "reference, angle of attack"),
+    Q("beta_d", "rad", "reference, sideslip"),
+    Q("e_mu", "rad", "synchronization error, bank", bound="wall"),
+    Q("e_alpha", "rad", "synchronization error, angle of attack", bound="wall"),
+    Q("e_beta", "rad", "synchronization error, sideslip", bound="wall"),
+    Q("wall", "rad", "upper bound"),
+    Q("p_d", "rad/s", "filtered rate command, roll"),
+    Q("q_d", "rad/s", "filtered rate command, pitch"),
+    Q("r_d", "rad/s", "filtered rate command, yaw"),
+    Q("D1_mu", "rad/s", "estimated disturbance, bank"),
+    Q("D1_alpha", "rad/s", "estimated disturbance, angle of attack"),
+    Q("D1_beta", "rad/s", "estimated disturbance, sideslip"),
+    Q("D2_p", "rad/s^2", "estimated disturbance, roll rate"),
+    Q("D2_q", "rad/s^2", "estimated disturbance, pitch rate"),
+    Q("D2_r", "rad/s^2", "estimated disturbance, yaw rate"),
+    Q("W1", "rad/s", "norm of the first network's weights"),
+    Q("W2", "rad/s^2", "norm of the second network's weights"),
+    Q("aileron_wanted", "rad", "aileron before its limits"),
+    Q("elevator_wanted", "rad", "elevator before its limits"),
+    Q("rudder_wanted", "rad", "rudder before its limits"),
+)
+GRAPH = Assumption.STRONGLY_CONNECTED
+COMMANDS = ("aileron", "elevator", "rudder", "thrust")
+PLANT = "attitude"
+FORMS: dict[str, dict[str, float]] = {"flight": {}, "monograph": {}}
+SWITCHES = {
+    "fault_tolerance": {"k6": 0.0, "k13": 0.0, "observer1": 0.0, "observer2": 0.0, "nominal": 1.0},
+    "networks": {"k6": 0.0, "k13": 0.0},
+    "observers": {"observer1": 0.0, "observer2": 0.0},
+}
+
+_LEAST_AIRSPEED = 8.0
+"""Airspeed guard, m/s: the surfaces' effect is proportional to V^2."""
+_LARGEST_SIDESLIP = math.radians(60.0)
+"""Sideslip guard in the kinematics, rad."""
+_DEGREES = math.radians(1.0)
+_BUTTERWORTH = math.sqrt(0.5)
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@compiled
+def _attitude_error(own, reference):
+    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
+
+
+@compiled
+def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
+    """State at the first tick: predictions as measured, estimated disturbances 0, networks empty."""
+    x1, x2 = (own.mu, own.alpha, own.beta), (own.p, own.q, own.r)
+    return State(
+        began=own.t, ticks=0.0,
+        pi1=scaled(-gains.k2, x1), pi2=scaled(-gains.k9, x2), x1_hat=x1, x2_hat=x2,
+        x2_d=_ZERO, mu1=_ZERO, mu2=_ZERO, u_f=_ZERO, u_f_dot=_ZERO, error_rate=_ZERO,
+        W1=0.0, W2=0.0,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+@compiled
+def _transformed(e, eps, gains):
+    """E and eta of the three axes, eqs. (8.16), (8.17)."""
+    E_mu, eta_mu = bounded_transform(e[0], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
+    E_alpha, eta_alpha = bounded_transform(e[1], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
+    E_beta, eta_beta = bounded_transform(e[2], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
+    return (E_mu, E_alpha, E_beta), (eta_mu, eta_alpha, eta_beta)
+
+
+@compiled
+def _adapt_first(W, own, error, gains, dt):
+    """Output of the first network (before r1); its weights a tick later (8.27). 27 centres on the grid {-1, 0, 1}^3."""
+    unit = 4.0 * _DEGREES
+    mu, alpha, beta = own.mu / (20.0 * _DEGREES), (own.alpha - unit) / unit, own.beta / unit
+    output = _ZERO
+    n = 0
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            for k in range(-1, 2):
+                activation = math.exp(-((mu - i) * (mu - i)) - (alpha - j) * (alpha - j) - (beta - k) * (beta - k))
+                output = added(output, adapt_neuron(W, n, activation, error, gains.k6, gains.k7, dt))
+                n += 1
+    return output
+
+
+@compiled
+def _adapt_second(W, own, u_f, error, gains, dt):
+    """Output of the second network (before r2); its weights a tick later (8.39). 17 centres: 0 and +-1 on each axis."""
+    unit, full = 4.0 * _DEGREES, 30.0 * _DEGREES
+    inputs = (
+        clip((own.alpha - unit) / unit, -3.0, 3.0),
+        clip(own.beta / unit, -3.0, 3.0),
+        clip(own.p / full, -3.0, 3.0),
+        clip(own.q / (20.0 * _DEGREES), -3.0, 3.0),
+        clip(own.r / (20.0 * _DEGREES), -3.0, 3.0),
+        clip(u_f[0] / full, -3.0, 3.0),
+        clip((u_f[1] + 15.0 * _DEGREES) / full, -3.0, 3.0),
+        clip(u_f[2] / full, -3.0, 3.0),
+    )
+    square = 0.0
+    for z in inputs:
+        square += z * z
+    width = 8.0 * 1.2 * 1.2
+    output = adapt_neuron(W, 0, math.exp(-square / width), error, gains.k13, gains.k14, dt)
+    n = 1
+    for z in inputs:
+        plus, minus = square - 2.0 * z + 1.0, square + 2.0 * z + 1.0
+        output = added(output, adapt_neuron(W, n, math.exp(-plus / width), error, gains.k13, gains.k14, dt))
+        output = added(output, adapt_neuron(W, n + 1, math.exp(-minus / width), error, gains.k13, gains.k14, dt))
+        n += 2
+    return output
+
+
+@compiled
+def _frobenius(W):
+    total = 0.0
+    for n in range(W.shape[0]):
+        for axis in range(3):
+            total += W[n, axis] * W[n, axis]
+    return math.sqrt(total)
+
+
+@compiled
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
+    """One tick: the state ``dt`` later, and what is commanded and seen now. All rates are those of the tick's start."""
+    first = state.ticks == 0.0
+    V = max(own.V, _LEAST_AIRSPEED)
+    x1, x2 = (own.mu, own.alpha, own.beta), (own.p, own.q, own.r)
+    reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
+    weights_seen = _frobenius(state.W1), _frobenius(state.W2)
+
+    # Synchronization error (8.10) in its bound (8.12).
+    error = _attitude_error(own, reference)
+    weights, differences, rates_sum = error_sums(error, heard, gains.oldest)
+    phi = gains.lambda1 + gains.lambda2 * weights
+    e = added(scaled(gains.lambda1, error), scaled(gains.lambda2, differences))
+    eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.iota)
+    E, eta = _transformed(e, eps, gains)
+    steep = times(eta, E)
+
+    # Outer loop (8.22)-(8.28).
+    sideslip = clip(own.beta, -_LARGEST_SIDESLIP, _LARGEST_SIDESLIP)
+    g1 = kinematics(own.alpha, sideslip)
+    turning = applied(g1, x2)
+    U1 = subtracted(x1, state.x1_hat)
+    learned = added(steep, scaled(gains.k3, U1))
+    f1 = scaled(1.0 / gains.r1, _adapt_first(state.W1, own, scaled(phi / gains.r1, learned), gains, dt))
+    if gains.nominal > 0.0:
+        f1 = attitude_drift(own.V, own.gamma, (own.mu, own.alpha, sideslip), own.thrust, V, model)
+    D1 = scaled(gains.observer1, added(state.pi1, scaled(gains.k2, x1)))
+    wanted_rate = subtracted(reference_rate, added(f1, D1))
+    pull = subtracted(times((gains.k4_mu, gains.k4_alpha, gains.k4_beta), E), scaled(gains.k5, state.mu1))
+    shared = scaled(gains.lambda2 * gains.derivatives, rates_sum)
+    pushed = subtracted(added(scaled(eps_rate / eps, e), shared), over(pull, eta))
+    limit = (gains.rate_limit, gains.rate_limit, gains.rate_limit)
+    x2_bar = applied(kinematics_inverse(own.alpha, sideslip), added(wanted_rate, scaled(1.0 / phi, pushed)))
+    x2_bar = limited_to(x2_bar, scaled(-1.0, limit), limit)
+    x2_d = x2_bar if first else state.x2_d
+    zeta1 = subtracted(x2_d, x2_bar)
+
+    # Inner loop (8.34)-(8.41).
+    f2_nominal, g2 = body_rate_model(V, own.alpha, own.beta, x2, V, model)
+    e2, U2 = subtracted(x2, x2_d), subtracted(x2, state.x2_hat)
+    learned = added(e2, scaled(gains.k10, U2))
+    f2 = scaled(1.0 / gains.r2, _adapt_second(state.W2, own, state.u_f, scaled(1.0 / gains.r2, learned), gains, dt))
+    if gains.nominal > 0.0:
+        f2 = f2_nominal
+    D2 = scaled(gains.observer2, added(state.pi2, scaled(gains.k9, x2)))
+    acceleration = subtracted(scaled(-1.0 / gains.tau, zeta1), added(f2, D2))
+    acceleration = subtracted(acceleration, times((gains.k11_p, gains.k11_q, gains.k11_r), e2))
+    acceleration = added(acceleration, scaled(gains.k12, state.mu2))
+    acceleration = subtracted(acceleration, scaled(phi, applied_transposed(g1, steep)))
+    wanted = deflections_for(g2, acceleration)
+    u0 = limited_to(wanted, least_deflections(model), largest_deflections(model))
+    zeta2 = subtracted(u0, wanted)
+
+    # One step of the internal states.
+    effect = applied(g2, u0)
+    x1_hat_rate = added(added(f1, turning), added(D1, scaled(gains.k1, U1)))
+    x2_hat_rate = added(added(f2, effect), added(D2, scaled(gains.k8, U2)))
+    explained = added(added(f1, turning), added(state.pi1, scaled(gains.k2, x1)))
+    driven = added(scaled(phi, steep), added(scaled(gains.k3 * phi, U1), E))
+    pi1_rate = subtracted(driven, scaled(gains.k2, explained))
+    explained = added(added(f2, effect), added(state.pi2, scaled(gains.k9, x2)))
+    pi2_rate = subtracted(added(scaled(gains.k10, U2), e2), scaled(gains.k9, explained))
+    mu1 = vector_auxiliary_step(state.mu1, gains.k5, phi * dot(steep, applied(g1, zeta1)), zeta1, gains.mu1_floor, dt)
+    mu2 = vector_auxiliary_step(state.mu2, gains.k12, dot(e2, applied(g2, zeta2)), zeta2, gains.mu2_floor, dt)
+    u_f, u_f_dot = _low_passed(u0 if first else state.u_f, state.u_f_dot, u0, gains.w_u, dt)
+    after = State(
+        began=state.began, ticks=state.ticks + 1.0,
+        pi1=added(state.pi1, scaled(dt, pi1_rate)), pi2=added(state.pi2, scaled(dt, pi2_rate)),
+        x1_hat=added(state.x1_hat, scaled(dt, x1_hat_rate)), x2_hat=added(state.x2_hat, scaled(dt, x2_hat_rate)),
+        x2_d=added(x2_bar, scaled(math.exp(-dt / gains.tau), zeta1)),
+        mu1=mu1, mu2=mu2, u_f=u_f, u_f_dot=u_f_dot,
+        error_rate=subtracted(x1_hat_rate, reference_rate),
+        W1=state.W1, W2=state.W2,
+    )  # fmt: skip
+    thrust = clip(gains.thrust + gains.k_speed * (gains.speed - own.V), model.thrust_min, model.thrust_max)
+    shown = Output(u0[0], u0[1], u0[2], thrust, e, eps, D1, D2, weights_seen[0], weights_seen[1], wanted)
+    return after, shown
+
+
+@compiled
+def _low_passed(value, rate, target, w, dt):
+    """(8.7) a tick later, implicitly."""
+    a, a_rate = second_order_reference_step(value[0], rate[0], target[0], 0.0, w, _BUTTERWORTH, dt)
+    e, e_rate = second_order_reference_step(value[1], rate[1], target[1], 0.0, w, _BUTTERWORTH, dt)
+    r, r_rate = second_order_reference_step(value[2], rate[2], target[2], 0.0, w, _BUTTERWORTH, dt)
+    return (a, e, r), (a_rate, e_rate, r_rate)
+
+
+@compiled
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
+    """The own attitude error, and its rate as the predictor of the tick before had it."""
+    return _attitude_error(own, reference) + state.error_rate
+
+
+@compiled
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
+    """`SIGNALS`."""
+    return (
+        reference.mu,
+        reference.alpha,
+        reference.beta,
+        *output.e,
+        gains.k_up * output.eps,
+        *state.x2_d,
+        *output.D1,
+        *output.D2,
+        output.W1,
+        output.W2,
+        *output.wanted,
+    )
+
+
+def check(gains: Gains, flight: Flight) -> list[Problem]:
+    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    names = (
+        "lambda1 k_up k_lo eps0 eps_inf iota k1 k2 k4_mu k4_alpha k4_beta k5 r1 r2 k8 k9 k11_p k11_q k11_r k12 "
+        "mu1_floor mu2_floor tau w_u rate_limit"
+    )
+    problems = positive(gains, names)
+    if gains.eps0 < gains.eps_inf:
+        problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
+    if not 0.0 < gains.edge < 1.0:
+        problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
+    problems += stable_in_steps({name: getattr(gains, name) for name in ("k1", "k2", "k8", "k9")}, flight.period)
+    return problems
