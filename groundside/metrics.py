@@ -1,8 +1,9 @@
 """Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
 
 An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
-same times. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d`` and ``z_d`` (the
-position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below all leaders) and
+same times, ``total(z)`` and ``largest(z)`` are taken over all followers, ``disagreement(z)`` = sum_j a_ij (z_i - z_j) over
+those whom a follower hears. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d`` and
+``z_d`` (the position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below all leaders) and
 ``hull_distance_x`` (how far ahead of or behind them).
 """
 
@@ -85,6 +86,30 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
+def _total(x: Array, i: int, graph: Graph) -> Array:
+    return np.asarray(x.sum(axis=0), np.float64)
+
+
+def _largest(x: Array, i: int, graph: Graph) -> Array:
+    return np.asarray(x.max(axis=0), np.float64)
+
+
+def _disagreement(x: Array, i: int, graph: Graph) -> Array:
+    found = np.zeros(x.shape[1])
+    for j, weight in enumerate(graph.adjacency[i, : len(x)]):
+        if weight > 0.0:
+            found += weight * (x[i] - x[j])
+    return found
+
+
+_SWARM_FUNCTIONS: dict[str, Callable[[Array, int, Graph], Array]] = {
+    "total": _total,
+    "largest": _largest,
+    "disagreement": _disagreement,
+}
+"""Of the values of all followers (followers, n), seen by the i-th."""
+
+
 def _parsed(expression: str) -> ast.expr:
     try:
         return ast.parse(expression.strip(), mode="eval").body
@@ -104,8 +129,11 @@ def names_in(expression: str) -> set[str]:
     called = set()
     for node in ast.walk(_parsed(expression)):
         if isinstance(node, ast.Call):
-            if not isinstance(node.func, ast.Name) or node.func.id not in _FUNCTIONS or node.keywords:
-                raise ValueError(f"{expression!r}: functions are {', '.join(_FUNCTIONS)}")
+            known = {**_FUNCTIONS, **_SWARM_FUNCTIONS}
+            if not isinstance(node.func, ast.Name) or node.func.id not in known or node.keywords:
+                raise ValueError(f"{expression!r}: functions are {', '.join(known)}")
+            if node.func.id in _SWARM_FUNCTIONS and len(node.args) != 1:
+                raise ValueError(f"{expression!r}: {node.func.id} takes one argument")
             called.add(id(node.func))
         elif isinstance(node, ast.Name):
             names.add((id(node), node.id))
@@ -147,6 +175,20 @@ def check_expression(expression: str, columns: Iterable[str]) -> None:
 def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
     """An expression for one UAV, at all its recorded times."""
     t = signals.column("t", uav)
+    with np.errstate(all="ignore"):
+        result = np.asarray(_value(_parsed(expression), signals, graph, uav), np.float64)
+    return np.broadcast_to(result, t.shape)
+
+
+def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> Any:
+    t = signals.column("t", uav)
+
+    def of_all(node: ast.expr) -> Array:
+        rows = []
+        for other in graph.followers:
+            times = signals.column("t", other)
+            rows.append(_at(t, times, np.broadcast_to(_value(node, signals, graph, other), times.shape)))
+        return np.array(rows)
 
     def value(node: ast.expr) -> Any:
         if isinstance(node, ast.BinOp):
@@ -155,19 +197,20 @@ def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Arra
             return _OPERATORS[type(node.op)](value(node.operand))
         if isinstance(node, ast.Call):
             assert isinstance(node.func, ast.Name)
+            if node.func.id in _SWARM_FUNCTIONS:
+                place = graph.followers.index(uav) if uav in graph.followers else -1
+                return _SWARM_FUNCTIONS[node.func.id](of_all(node.args[0]), place, graph)
             return _FUNCTIONS[node.func.id](*(value(argument) for argument in node.args))
         if isinstance(node, ast.Name):
             return _column(node.id, signals, graph, uav)
         if isinstance(node, ast.Subscript):
-            name, other = _other(expression, node)
+            name, other = _other(ast.unparse(expression), node)
             return _at(t, signals.column("t", other), _column(name, signals, graph, other))
         assert isinstance(node, ast.Constant)
         assert isinstance(node.value, (int, float))
         return np.float64(node.value)
 
-    with np.errstate(all="ignore"):
-        result = np.asarray(value(_parsed(expression)), np.float64)
-    return np.broadcast_to(result, t.shape)
+    return value(expression)
 
 
 def _at(t: Array, times: Array, values: Array) -> Array:

@@ -35,7 +35,7 @@ from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Lag, Plan, RateLimits
-from ftcc.link.actuators import ELEVATOR, SLOT, THRUST, in_slots, unit_of
+from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, SLOT, THRUST, in_slots, unit_of
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
@@ -135,6 +135,10 @@ def resolve(scenario: Scenario) -> Mission:
         thrust_max=high[THRUST],
         elevator_min=low[ELEVATOR],
         elevator_max=high[ELEVATOR],
+        aileron_min=low[AILERON],
+        aileron_max=high[AILERON],
+        rudder_min=low[RUDDER],
+        rudder_max=high[RUDDER],
         lag=plan.plant.lag.elevator,
     )
     autopilots = tuple(

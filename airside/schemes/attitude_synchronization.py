@@ -109,7 +109,6 @@ class Gains(NamedTuple):
     k24: Annotated[float, Q("k24", "1/s", "leak of Theta_2", 0.08)]
     phi_s: Annotated[float, Q("phi_s", "-", "boundary layer of sign() (chosen)", 0.002)]
     w_u: Annotated[float, Q("w_u", "rad/s", "low-pass of the command, input of the second network (chosen)", 20.0)]
-    thrust: Annotated[float, Q("T", "N", "thrust, held: trim at 30 m/s (chosen)", 21.3032)]
     substeps: Annotated[float, Q("N", "-", "Euler steps per tick", 5.0)]
     edge: Annotated[float, Q("edge", "-", "share of the funnel with a linear transform beyond (not in paper)", 0.98)]
     neighbour_filter: Annotated[float, Q("w_f", "rad/s", "filter of neighbours, 0: none (not in paper)", 0.0)]
@@ -158,7 +157,6 @@ class Output(NamedTuple):
     aileron: float
     elevator: float
     rudder: float
-    thrust: float
     E: Vector
     """Synchronization error, rad."""
     eps: float
@@ -202,7 +200,7 @@ SIGNALS = (
     Q("rudder_wanted", "rad", "rudder before its limits"),
 )
 GRAPH = Assumption.CONNECTED_UNDIRECTED
-COMMANDS = ("aileron", "elevator", "rudder", "thrust")
+COMMANDS = ("aileron", "elevator", "rudder")
 PLANT = "attitude"
 FORMS = {
     "monograph": {},
@@ -466,7 +464,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         x2_hat=x2_hat, d=d,
         neighbours=state.neighbours,
     )  # fmt: skip
-    return after, Output(sent[0], sent[1], sent[2], gains.thrust, E, eps, F1, x2_bar, d, wanted)
+    return after, Output(sent[0], sent[1], sent[2], E, eps, F1, x2_bar, d, wanted)
 
 
 @compiled

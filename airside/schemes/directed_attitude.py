@@ -11,8 +11,7 @@ The chapter's table of parameters and its networks' layout are lost; those here 
 - the error that the transform sees is limited to a share of the bound, the virtual rate command to `rate_limit`;
 - one explicit Euler step per tick, but implicit ones for the auxiliary systems and the low-passed command, and an exact
   one for the first-order filter;
-- a neighbour whose newest record is too old is left out of the error, of its gain and of the derivatives;
-- a speed law of the thrust, without which the phugoid of the commanded angle of attack ends the flight.
+- a neighbour whose newest record is too old is left out of the error, of its gain and of the derivatives.
 """
 
 from __future__ import annotations
@@ -102,9 +101,6 @@ class Gains(NamedTuple):
     oldest: Annotated[float, Q("oldest", "s", "age at which a neighbour is dropped, 0: held (not in paper)", 0.5)]
     edge: Annotated[float, Q("edge", "-", "share of the bound that the transform sees (not in paper)", 0.95)]
     rate_limit: Annotated[float, Q("rate_limit", "rad/s", "largest rate command (not in paper)", 10.0)]
-    thrust: Annotated[float, Q("T_0", "N", "thrust at the set speed (not in paper)", 20.0)]
-    speed: Annotated[float, Q("V_0", "m/s", "set speed (not in paper)", 24.0)]
-    k_speed: Annotated[float, Q("k_V", "N s/m", "thrust per speed error, 0: thrust held (not in paper)", 10.0)]
 
 
 class State(NamedTuple):
@@ -132,7 +128,6 @@ class Output(NamedTuple):
     aileron: float
     elevator: float
     rudder: float
-    thrust: float
     e: Vector
     """Synchronization error, rad."""
     eps: float
@@ -181,7 +176,7 @@ SIGNALS = (
     Q("rudder_wanted", "rad", "rudder before its limits"),
 )
 GRAPH = Assumption.STRONGLY_CONNECTED
-COMMANDS = ("aileron", "elevator", "rudder", "thrust")
+COMMANDS = ("aileron", "elevator", "rudder")
 PLANT = "attitude"
 FORMS: dict[str, dict[str, float]] = {"flight": {}, "monograph": {}}
 SWITCHES = {
@@ -353,8 +348,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         error_rate=subtracted(x1_hat_rate, reference_rate),
         W1=state.W1, W2=state.W2,
     )  # fmt: skip
-    thrust = clip(gains.thrust + gains.k_speed * (gains.speed - own.V), model.thrust_min, model.thrust_max)
-    shown = Output(u0[0], u0[1], u0[2], thrust, e, eps, D1, D2, weights_seen[0], weights_seen[1], wanted)
+    shown = Output(u0[0], u0[1], u0[2], e, eps, D1, D2, weights_seen[0], weights_seen[1], wanted)
     return after, shown
 
 
