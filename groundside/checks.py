@@ -357,12 +357,20 @@ def _motion(state: Any) -> Reference:
     )
 
 
+def _speed(plan: Plan, uav: int) -> float:
+    """The airspeed at which a UAV must be able to fly level: the mission's, or that of its start."""
+    if plan.mission is not None:
+        return plan.mission.V
+    own = plan.start.uav.get(uav, plan.start)
+    return own.V or plan.start.V or math.nan
+
+
 def check_faults(plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], findings: Findings) -> None:
     """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel."""
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
         vehicle = by_uav[fault.uav]
-        V = plan.mission.V if plan.mission is not None else vehicle.initial[0]
+        V = _speed(plan, fault.uav)
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
         end = min(later, default=math.inf)
         low, high = vehicle.limits[SLOT[fault.actuator]]
