@@ -145,7 +145,7 @@ def test_a_template_that_does_not_exist_is_named():
 
 
 def test_records_and_vectors_are_inverse_to_each_other():
-    vector = np.zeros(20)
+    vector = np.zeros(len(AIRFRAME) + 4)
     store(AIRFRAME, vector)
     assert fields(type(AIRFRAME), vector) == AIRFRAME
     assert not vector[len(AIRFRAME) :].any()
