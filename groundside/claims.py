@@ -14,7 +14,7 @@ from ftcc.groundside.metrics import DERIVED, METRICS, Signals, check_expression,
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 
-__all__ = ["Result", "Tolerance", "check_claims", "evaluate", "failed", "tolerance_of"]
+__all__ = ["Result", "Tolerance", "by_case", "check_claims", "evaluate", "failed", "tolerance_of", "uavs_of"]
 
 _TOLERANCE = re.compile(
     r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[-+0-9.eE]+))?\s*$"
@@ -98,11 +98,11 @@ class Result:
         }
 
 
-def _by_case(entry: Any, case: str) -> Any:
+def by_case(entry: Any, case: str) -> Any:
     return entry.get(case, entry.get("default")) if isinstance(entry, Mapping) else entry
 
 
-def _uavs_of(claim: Claim, graph: Graph) -> tuple[int, ...]:
+def uavs_of(claim: Claim, graph: Graph) -> tuple[int, ...]:
     if isinstance(claim.uavs, str):
         return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[claim.uavs]
     return tuple(claim.uavs)
@@ -126,11 +126,11 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
             if names_in(claim.signal) & set(DERIVED) and not led:
                 problems.append(f"{where}: signal {claim.signal!r} needs leaders that reach every follower")
             others = uavs_in(claim.signal)
-        strangers = sorted((set(_uavs_of(claim, graph)) | others) - set(graph.uavs))
+        strangers = sorted((set(uavs_of(claim, graph)) | others) - set(graph.uavs))
         if strangers:
             problems.append(f"{where}: uavs {', '.join(map(str, strangers))} do not exist")
         for case, expected in claim.expected.items():
-            tolerance = _by_case(claim.tolerance, case)
+            tolerance = by_case(claim.tolerance, case)
             if tolerance is None:
                 problems.append(f"{where}: no tolerance for case {case!r}")
             else:
@@ -138,10 +138,10 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
                     tolerance_of(tolerance)
                 except ValueError as error:
                     problems.append(f"{where}: {error}")
-            if METRICS[claim.metric].threshold and _by_case(claim.threshold, case) is None:
+            if METRICS[claim.metric].threshold and by_case(claim.threshold, case) is None:
                 problems.append(f"{where}: metric {claim.metric} needs a threshold in case {case!r}")
-            if isinstance(expected, list) and len(expected) != len(_uavs_of(claim, graph)):
-                problems.append(f"{where}: expected has {len(expected)} values for {len(_uavs_of(claim, graph))} UAVs")
+            if isinstance(expected, list) and len(expected) != len(uavs_of(claim, graph)):
+                problems.append(f"{where}: expected has {len(expected)} values for {len(uavs_of(claim, graph))} UAVs")
     return problems
 
 
@@ -162,9 +162,9 @@ def failed(results: Iterable[Result]) -> list[Result]:
 
 
 def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float) -> Result:
-    uavs = _uavs_of(claim, graph)
+    uavs = uavs_of(claim, graph)
     expected = claim.expected[case]
-    tolerance = tolerance_of(_by_case(claim.tolerance, case))
+    tolerance = tolerance_of(by_case(claim.tolerance, case))
 
     def result(value: float | list[float] | None, ok: bool | None, remark: str = "") -> Result:
         return Result(claim, uavs, value, expected, tolerance.text, ok, remark)
@@ -172,7 +172,7 @@ def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float)
     if claim.window[1] > end + 1e-6:
         return result(None, None, "not flown")
     metric = METRICS[claim.metric]
-    threshold = float(_by_case(claim.threshold, case) or 0.0)
+    threshold = float(by_case(claim.threshold, case) or 0.0)
     values = []
     for uav in uavs:
         t = signals.column("t", uav)

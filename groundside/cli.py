@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside import cli_fly
+from ftcc.groundside import cli_fly, cli_study
 from ftcc.groundside.cli_common import (
     Duration,
     Form,
@@ -198,6 +198,7 @@ def report(
 
 
 cli_fly.register(app)
+cli_study.register(app)
 
 
 def main() -> None:

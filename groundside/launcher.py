@@ -91,7 +91,7 @@ class Outcome:
 
 
 @contextlib.contextmanager
-def _no_main_module() -> Iterator[None]:
+def no_main_module() -> Iterator[None]:
     """Keep children from importing the program that started us."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = types.ModuleType("__main__")
@@ -170,7 +170,7 @@ class Swarm:
         context.set_forkserver_preload(["ftcc.groundside.preload"])
         vehicles = {spec.uav: spec for spec in self.mission.vehicles}
         autopilots = {spec.uav: spec for spec in self.mission.autopilots}
-        with _no_main_module():
+        with no_main_module():
             for group in self.groups:
                 self._spawn(context, "vehicle", group, run_vehicles, [vehicles[uav] for uav in group])
                 self._spawn(context, "autopilot", group, run_autopilots, [autopilots[uav] for uav in group])

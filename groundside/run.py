@@ -35,8 +35,17 @@ class RunError(UserError):
     """A folder that is no run, or a run that cannot be read."""
 
 
-def new_folder(name: str, out: str | Path | None = None) -> Path:
+def new_folder(name: str, out: str | Path | None = None, kind: str = "runs", holds: str = "scenario.toml") -> Path:
     """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the present folder.
+
+    Parameters
+    ----------
+    name : str
+    out : Path, optional
+    kind : str
+        Instead of ``runs``.
+    holds : str
+        The file that such a folder has.
 
     Raises
     ------
@@ -44,13 +53,13 @@ def new_folder(name: str, out: str | Path | None = None) -> Path:
         If it cannot be written, or ``out`` already holds a run.
     """
     if out is None:
-        stem = Path("runs") / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+        stem = Path(kind) / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
         tries = [stem, *(stem.with_name(f"{stem.name}-{n}") for n in range(2, 100))]
         folder = next(path for path in tries if not path.exists())
     else:
         folder = Path(out)
-    if (folder / "scenario.toml").exists():
-        raise RunError(f"--out {folder}: already holds a run; give a folder that is empty or does not exist")
+    if (folder / holds).exists():
+        raise RunError(f"--out {folder}: already holds {holds}; give a folder that is empty or does not exist")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):

@@ -27,7 +27,7 @@ from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import build as build_vehicles
 
-__all__ = ["Flight", "PlainPython", "fly", "loop_of", "simulate"]
+__all__ = ["Flight", "PlainPython", "fly", "loop_of", "record", "simulate"]
 
 _CHUNKS = 100
 """A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
@@ -213,15 +213,19 @@ def simulate(
     mission: Mission, folder: Path, progress: Progress | None = None, ready: Callable[[], None] | None = None
 ) -> Run:
     """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
-    flight = fly(mission, progress, ready)
+    return record(fly(mission, progress, ready), folder)
 
+
+def record(flight: Flight, folder: Path) -> Run:
+    """Write a flight into ``folder``, as the processes of a swarm would."""
     # Arrow, and what the columns' descriptions pull in, are not needed before the flight.
     from ftcc.airside.process import columns as autopilot_columns
     from ftcc.sim.process import columns as vehicle_columns
 
+    mission = flight.mission
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
     events = EventLog(folder / "events.jsonl")
     for t, uav, text in mission.events:
         if len(flight.t) and t <= flight.t[-1]:

@@ -1,0 +1,212 @@
+"""The flights of a study, on all cores: processes that load the compiled law once, then fly trial after trial."""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import dataclasses
+import functools
+import multiprocessing
+import os
+import signal
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ftcc.groundside.claims import Result, evaluate
+from ftcc.groundside.launcher import no_main_module
+from ftcc.groundside.mission import resolve
+from ftcc.groundside.simulate import PlainPython, fly, record
+from ftcc.groundside.study.plan import Study, Trial
+
+__all__ = ["Outcome", "fly_all", "run_folder"]
+
+_ONE_THREAD = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one flight of a study showed."""
+
+    trial: Trial
+    results: tuple[Result, ...]
+    """The claims of the scenario's case; empty if it did not fly."""
+    lost: dict[int, tuple[float, str]]
+    """When (s) and why UAVs were lost."""
+    wall: float
+    """Wall time of the flight, s."""
+    problem: str
+    """Why there was no flight, or why it broke off; empty if there was one."""
+
+    @property
+    def error(self) -> str:
+        """What went wrong, lost UAVs included; empty if nothing did."""
+        lost = [f"UAV {uav} lost at {t:g} s: {why}" for uav, (t, why) in self.lost.items()]
+        return "; ".join([self.problem] if self.problem else lost)
+
+
+class _StoppedError(Exception):
+    """The study has been interrupted."""
+
+
+def run_folder(folder: Path, trial: Trial) -> Path:
+    """Where a trial is recorded, if it is."""
+    return folder / "runs" / f"{trial.number:04d}"
+
+
+def fly_all(
+    study: Study,
+    jobs: int,
+    report: Callable[[Outcome], None],
+    record_in: Path | None = None,
+    ready: Callable[[], None] | None = None,
+) -> bool:
+    """Fly all trials of a study.
+
+    Parameters
+    ----------
+    study : Study
+    jobs : int
+        Number of processes.
+    report : callable
+        Called with every outcome as it comes, in no particular order.
+    record_in : Path, optional
+        The study's folder, where every flight is recorded; by default none is.
+    ready : callable, optional
+        Called once when the law is compiled.
+
+    Returns
+    -------
+    bool
+        False if Ctrl-C ended the study before its time.
+    """
+    trials = collections.deque(study.trials)
+    jobs = min(jobs, len(trials))
+    context = multiprocessing.get_context("spawn")
+    stop = context.Event()
+    pool_of = functools.partial(
+        ProcessPoolExecutor, mp_context=context, initializer=_begin, initargs=(study, record_in, stop)
+    )
+    try:
+        # Compiled once here, or by every process at the same time.
+        timing = dataclasses.replace(study.mission.timing, ticks=0)
+        fly(dataclasses.replace(study.mission, timing=timing))
+        if ready is not None:
+            ready()
+        while trials:
+            for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report):
+                # A process died. Whose fault it was shows when each of those that were in flight flies alone.
+                for guilty in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report):
+                    report(Outcome(guilty, (), {}, 0.0, "its process died"))
+    except KeyboardInterrupt:
+        return False
+    finally:
+        stop.set()
+    return True
+
+
+def _fly_in_pool(
+    pool: ProcessPoolExecutor, trials: collections.deque[Trial], jobs: int, report: Callable[[Outcome], None]
+) -> list[Trial]:
+    """Fly the trials until none is left or a process dies; those that were in flight then."""
+    flying: dict[Future[Outcome], Trial] = {}
+    try:
+        while trials or flying:
+            while trials and len(flying) < jobs:
+                flying[_submit(pool, trials[0])] = trials[0]
+                trials.popleft()
+            done, _ = wait(flying, return_when=FIRST_COMPLETED)
+            for future in done:
+                outcome = future.result()
+                del flying[future]
+                report(outcome)
+    except BrokenProcessPool:
+        return [*flying.values()]
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+    return []
+
+
+def _submit(pool: ProcessPoolExecutor, trial: Trial) -> Future[Outcome]:
+    """Hand over a trial; a process that is started for it does not import the program that started us."""
+    with no_main_module(), _one_thread(), _deaf_to_ctrl_c():
+        return pool.submit(_fly, trial)
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes started meanwhile use one thread each: the flights are what runs in parallel."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextlib.contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """Processes started meanwhile leave Ctrl-C to this one, from their first instruction on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# In the processes.
+
+_work: tuple[Study, Path | None, Any]
+
+
+def _begin(study: Study, record_in: Path | None, stop: Any) -> None:
+    global _work
+    _work = (study, record_in, stop)
+    warnings.simplefilter("ignore", PlainPython)
+
+
+def _fly(trial: Trial) -> Outcome:
+    """Fly one trial; whatever goes wrong with it is its outcome."""
+    study, record_in, stop = _work
+    problem = study.combinations[trial.combination].problem
+    if problem:
+        return Outcome(trial, (), {}, 0.0, problem)
+
+    def go_on(_: float) -> None:
+        if stop.is_set():
+            raise _StoppedError
+
+    begun = time.perf_counter()
+    try:
+        results, lost = _flown(study, trial, record_in, go_on)
+    except _StoppedError:
+        raise
+    except Exception as error:  # a flight that fails is a row of the table, not the end of the study
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
+        return Outcome(trial, (), {}, time.perf_counter() - begun, text)
+    return Outcome(trial, tuple(results), lost, time.perf_counter() - begun, "")
+
+
+def _flown(
+    study: Study, trial: Trial, record_in: Path | None, go_on: Callable[[float], None]
+) -> tuple[Iterable[Result], dict[int, tuple[float, str]]]:
+    mission = resolve(study.scenario(trial))
+    flight = fly(mission, go_on)
+    if record_in is not None:
+        record(flight, run_folder(record_in, trial))
+    return evaluate(flight, mission.claims, mission.case, mission.graph), flight.lost

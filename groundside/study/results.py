@@ -1,0 +1,209 @@
+"""What a study shows: a table with a row per flight, and a summary."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import itertools
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftcc.groundside.claims import Result, Tolerance, by_case, tolerance_of, uavs_of
+from ftcc.groundside.schema import Claim
+from ftcc.groundside.study.flights import Outcome
+from ftcc.groundside.study.plan import Study
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+__all__ = ["SCHEMA_VERSION", "Quantity", "kind_of", "label", "quantities", "summary", "table", "verdict", "write"]
+
+SCHEMA_VERSION = 1
+"""Of ``study.parquet``."""
+
+_VERSIONS = ("ftcc-sitl", "numba", "numpy")
+
+_COLUMNS_OF_SUMMARY = 8
+"""Combinations that a terminal has room for."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that every flight shows: a claim's value, or that of one UAV where each has its own."""
+
+    name: str
+    title: str
+    """Of its claim."""
+    claim: Claim
+    place: int
+    """Index of the claim."""
+    part: int | None
+    """Index into the claim's UAVs."""
+    expected: float
+    """In the scenario's case."""
+    tolerance: Tolerance
+
+    def of(self, outcome: Outcome) -> float | None:
+        """The number, None if the flight did not show it."""
+        value = outcome.results[self.place].value if outcome.results else None
+        return value[self.part or 0] if isinstance(value, list) else value
+
+    def among(self, outcomes: Iterable[Outcome]) -> list[float]:
+        """The numbers of those flights that show one."""
+        return [value for value in map(self.of, outcomes) if value is not None]
+
+
+def quantities(study: Study) -> list[Quantity]:
+    """What the claims of the study's case measure, in their order."""
+    mission = study.mission
+    found: list[Quantity] = []
+    for place, claim in enumerate(mission.claims):
+        expected = claim.expected[mission.case]
+        tolerance = tolerance_of(by_case(claim.tolerance, mission.case))
+        title = claim.name
+        while any(quantity.title == title for quantity in found):
+            title = f"{title}, again"
+        if isinstance(expected, list):
+            for part, (uav, one) in enumerate(zip(uavs_of(claim, mission.graph), expected, strict=True)):
+                found.append(Quantity(f"{title}, UAV {uav}", title, claim, place, part, one, tolerance))
+        else:
+            found.append(Quantity(title, title, claim, place, None, expected, tolerance))
+    return found
+
+
+def verdict(result: Result, in_case: bool) -> bool | None:
+    """Whether a claim holds, None where that cannot be said.
+
+    A band around an expected number speaks of the scenario's case alone: with other settings the number is a result
+    and no failure. A bound is a demand, which any flight can be held to; and a claim fails wherever its UAV was lost or
+    what it times never came about.
+    """
+    if in_case or tolerance_of(result.tolerance).bound or (result.ok is False and result.value is None):
+        return result.ok
+    return None
+
+
+def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
+    """All flights as a ``pyarrow.Table``, a row each.
+
+    Columns: ``flight``, the varied keys, ``seed``; for each claim its value under the claim's name, and ``NAME holds``;
+    ``lost`` (ids), ``error`` (text), ``wall`` (s). Null: not flown, or no such number. Units, tolerances and sources are
+    in the columns' metadata, the rest in the table's.
+    """
+    import pyarrow as pa
+
+    outcomes = sorted(outcomes, key=lambda outcome: outcome.trial.number)
+    combinations = [study.combinations[outcome.trial.combination] for outcome in outcomes]
+    columns: list[tuple[str, Any, list[Any], dict[str, str]]] = [
+        ("flight", pa.int32(), [outcome.trial.number for outcome in outcomes], {"unit": "-"})
+    ]
+    for n, variation in enumerate(study.variations):
+        kind, convert = kind_of(variation.values)
+        values = [convert(combination.values[n]) for combination in combinations]
+        columns.append((variation.key, kind, values, {"meaning": "varied"}))
+    columns.append(("seed", pa.int64(), [outcome.trial.seed for outcome in outcomes], {"unit": "-"}))
+    mission = study.mission
+    for (place, title), group in itertools.groupby(quantities(study), key=lambda one: (one.place, one.title)):
+        for quantity in group:
+            notes = _notes(quantity)
+            columns.append((quantity.name, pa.float64(), [quantity.of(outcome) for outcome in outcomes], notes))
+        verdicts = [
+            verdict(outcome.results[place], combination.in_case) if outcome.results else None
+            for outcome, combination in zip(outcomes, combinations, strict=True)
+        ]
+        columns.append((f"{title} holds", pa.bool_(), verdicts, {}))
+    columns += [
+        ("lost", pa.list_(pa.int32()), [list(outcome.lost) for outcome in outcomes], {"meaning": "UAVs"}),
+        ("error", pa.string(), [outcome.error or None for outcome in outcomes], {}),
+        ("wall", pa.float64(), [outcome.wall for outcome in outcomes], {"unit": "s", "meaning": "wall time"}),
+    ]
+    about = {
+        "ftcc.study": str(SCHEMA_VERSION),
+        "ftcc.scenario": str(study.name),
+        "ftcc.case": mission.case,
+        "ftcc.settings": json.dumps(study.settings),
+        "ftcc.duration": f"{mission.timing.duration:g}",
+        "ftcc.versions": json.dumps({name: importlib.metadata.version(name) for name in _VERSIONS}),
+    }
+    schema = pa.schema([pa.field(name, kind, metadata=notes) for name, kind, _, notes in columns], metadata=about)
+    return pa.Table.from_arrays([pa.array(values, kind) for _, kind, values, _ in columns], schema=schema)
+
+
+def _notes(quantity: Quantity) -> dict[str, str]:
+    claim = quantity.claim
+    return {
+        "unit": claim.unit,
+        "meaning": f"{claim.metric} of {claim.signal} over {claim.window[0]:g} to {claim.window[1]:g} s",
+        "expected": f"{quantity.expected:.9g}",
+        "tolerance": quantity.tolerance.text,
+        "source": claim.source,
+    }
+
+
+def kind_of(values: Sequence[Any]) -> tuple[Any, Any]:
+    """Arrow type of a varied key, and what makes its values that: numbers and truth stay what they are."""
+    import pyarrow as pa
+
+    if all(isinstance(value, bool) for value in values):
+        return pa.bool_(), bool
+    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
+        return pa.float64(), float
+    return pa.string(), str
+
+
+def write(study: Study, outcomes: Sequence[Outcome], folder: Path) -> Path:
+    """Write ``study.parquet`` into ``folder``; it appears when it is complete."""
+    import pyarrow.parquet as pq
+
+    path = folder / "study.parquet"
+    unfinished = path.with_suffix(".unfinished")
+    pq.write_table(table(study, outcomes), unfinished)
+    unfinished.replace(path)
+    return path
+
+
+def label(study: Study, combination: int, skip: int = 0) -> str:
+    """The values of a combination, but for the first ``skip`` keys, as text."""
+    values = study.combinations[combination].values
+    pairs = list(zip(study.variations, values, strict=True))[skip:]
+    return ", ".join(f"{v.key} = {value:g}" if isinstance(value, float) else f"{v.key} = {value}" for v, value in pairs)
+
+
+def summary(study: Study, outcomes: Sequence[Outcome]) -> Table:
+    """Medians and quartiles of every claim, a column per combination, for the terminal."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    shown = Table(
+        header_style="bold", pad_edge=False, caption="median \\[quartiles], flights that hold of those judged"
+    )
+    shown.add_column("claim", overflow="fold")
+    places = range(min(len(study.combinations), _COLUMNS_OF_SUMMARY))
+    groups = [[outcome for outcome in outcomes if outcome.trial.combination == n] for n in places]
+    for n in places:
+        shown.add_column(escape(label(study, n) or study.mission.case), justify="right")
+    shown.add_row("flights", *(str(len(group)) for group in groups))
+    shown.add_row("with lost aircraft", *(str(sum(bool(outcome.lost) for outcome in group)) for group in groups))
+    shown.add_row("not flown", *(str(sum(bool(outcome.problem) for outcome in group)) for group in groups))
+    shown.add_section()
+    for quantity in quantities(study):
+        cells = []
+        for n, group in zip(places, groups, strict=True):
+            in_case = study.combinations[n].in_case
+            verdicts = [verdict(outcome.results[quantity.place], in_case) for outcome in group if outcome.results]
+            judged = [one for one in verdicts if one is not None]
+            cells.append(_spread(quantity.among(group)) + (f"  {sum(judged)}/{len(judged)}" if judged else ""))
+        unit = quantity.claim.unit
+        shown.add_row(escape(quantity.name + (f", {unit}" if unit else "")), *cells)
+    return shown
+
+
+def _spread(values: Sequence[float]) -> str:
+    if not values:
+        return "-"
+    low, middle, high = np.percentile(values, [25, 50, 75])
+    return f"{middle:.4g}" + (f" \\[{low:.3g}, {high:.3g}]" if high > low else "")
