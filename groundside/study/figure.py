@@ -19,14 +19,15 @@ __all__ = ["draw"]
 def draw(study: Study, outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
     """Draw every claim over the first varied key, a line per combination of the others, as PNG and PDF.
 
-    Thick: quartiles; thin: smallest to largest; dashed: the claim's bound, dotted: what it expects of its case.
+    Thick: quartiles; thin: smallest to largest; dashed: the claim's bound, dotted: what it expects of its case. A claim
+    of which no flight shows a number is left out; where only some do, it is said how many.
     """
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    shown = quantities(study)
+    shown = [quantity for quantity in quantities(study) if quantity.among(outcomes)]
     if not shown:
         return []
     width = min(3, len(shown))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import tomllib
@@ -15,7 +16,6 @@ import tomli_w
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.mission import Mission, resolve
 from ftcc.groundside.scenario import Scenario, ScenarioError, load
-from ftcc.groundside.schema import Plan
 
 __all__ = ["Combination", "Study", "StudyError", "Trial", "Variation", "plan_study"]
 
@@ -94,18 +94,19 @@ class Study:
 
     def _planned(self) -> Study:
         """The study with all combinations, each loaded and, but for problems that it then tells, resolved."""
-        published = load(self.name, form=self.form, variants=self.variants).plan
+        published = load(self.name, form=self.form, variants=self.variants)
         # A run that was flown with settings of its own is no case of its scenario any more.
-        case = None if published.flown and published.flown.settings else _essence(published)
+        case = None
+        if not (published.plan.flown and published.plan.flown.settings):
+            with contextlib.suppress(ScenarioError):
+                case = _essence(resolve(published))
         combinations = []
         for values in itertools.product(*(variation.values for variation in self.variations)):
             chosen = self._load(values, self.seeds[0])
-            problem = ""
             try:
-                resolve(chosen)
+                combinations.append(Combination(values, _essence(resolve(chosen)) == case, ""))
             except ScenarioError as error:
-                problem = "; ".join(error.problems)
-            combinations.append(Combination(values, _essence(chosen.plan) == case, problem))
+                combinations.append(Combination(values, False, "; ".join(error.problems)))
         return dataclasses.replace(self, combinations=tuple(combinations))
 
 
@@ -159,9 +160,10 @@ def plan_study(
     return study
 
 
-def _essence(plan: Plan) -> dict[str, Any]:
+def _essence(mission: Mission) -> tuple[Any, ...]:
     """What makes a flight, but for its length and its chance."""
-    return plan.model_dump(exclude={"seed", "duration", "claims", "flown", "title"})
+    timing = dataclasses.replace(mission.timing, ticks=0, seed=0)
+    return mission.scheme.name, mission.wire, timing, mission.graph.weights, mission.vehicles, mission.autopilots
 
 
 def _toml(value: Any) -> str:

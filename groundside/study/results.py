@@ -91,8 +91,8 @@ def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
     """All flights as a ``pyarrow.Table``, a row each.
 
     Columns: ``flight``, the varied keys, ``seed``; for each claim its value under the claim's name, and ``NAME holds``;
-    ``lost`` (ids), ``error`` (text), ``wall`` (s). Null: not flown, or no such number. Units, tolerances and sources are
-    in the columns' metadata, the rest in the table's.
+    ``lost`` (ids), ``error`` (text), ``wall`` (s). Null: not flown, or no such number. Units, tolerances and sources
+    are in the columns' metadata, the rest in the table's.
     """
     import pyarrow as pa
 
@@ -178,9 +178,8 @@ def summary(study: Study, outcomes: Sequence[Outcome]) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    shown = Table(
-        header_style="bold", pad_edge=False, caption="median \\[quartiles], flights that hold of those judged"
-    )
+    caption = "median \\[quartiles], flights that hold of those judged"
+    shown = Table(header_style="bold", pad_edge=False, caption=caption)
     shown.add_column("claim", overflow="fold")
     places = range(min(len(study.combinations), _COLUMNS_OF_SUMMARY))
     groups = [[outcome for outcome in outcomes if outcome.trial.combination == n] for n in places]

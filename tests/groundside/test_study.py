@@ -1,0 +1,211 @@
+"""Studies: what they refuse, what they fly, what they leave behind, and how they end."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+from ftcc.groundside.cases import claims_in_flight
+from ftcc.groundside.errors import UserError
+from ftcc.groundside.scenario import load
+from ftcc.groundside.study import Outcome, draw, flights, fly_all, plan_study, table, write
+from tests.guests import EXAMPLE, forget_schemes, install
+
+SECONDS = 2.0
+TOO_STEEP = 1e-4
+"""A boundary layer, m, that is unstable in the steps of the flight form."""
+
+
+def short(document: dict[str, Any]) -> None:
+    """Two claims that two seconds of flight can decide, one about a number and one with a bound."""
+    document["duration"] = SECONDS
+    number = {
+        "name": "altitude", "metric": "mean", "signal": "z", "window": [0.0, SECONDS], "unit": "m",
+        "source": "test", "uavs": [1, 2], "expected": {"flight": [1005.0, 995.0]}, "tolerance": "3",
+    }  # fmt: skip
+    bound = {
+        "name": "hull", "metric": "max_abs", "signal": "hull_distance", "window": [0.0, SECONDS], "unit": "m",
+        "source": "test", "expected": {"flight": 0.0}, "tolerance": "< 0.5",
+    }  # fmt: skip
+    late = bound | {"name": "later", "window": [50.0, 60.0]}
+    document["claims"] = [number, bound, late]
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    import tomli_w
+
+    from ftcc.groundside.scenario import read, shipped
+
+    document = read(shipped()["demo"])
+    short(document)
+    path = tmp_path_factory.mktemp("scenario") / "short.toml"
+    path.write_text(tomli_w.dumps(document))
+    return path
+
+
+@pytest.fixture(scope="module")
+def flown(scenario: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+    """A study of loss, and of a gain of which one value is refused; its table as read back, and its folder."""
+    study = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
+    outcomes: list[Outcome] = []
+    assert fly_all(study, 2, outcomes.append)
+    folder = tmp_path_factory.mktemp("study")
+    write(study, outcomes, folder)
+    assert {path.name for path in draw(study, outcomes, folder)} == {"study.png", "study.pdf"}
+    return pq.read_table(folder / "study.parquet"), folder
+
+
+@pytest.mark.parametrize(
+    ("vary", "because"),
+    [
+        (["nonsense"], "--vary nonsense: must be key.path=value"),
+        (["channel.loss="], "--vary channel.loss=: must be key.path=value"),
+        (["channel.loss=0,,0.3"], "a value is missing between two commas"),
+        (["channel.loss=0.1,.1"], "a value stands there twice"),
+        (["channel.loss=0", "channel.loss=0.3"], "--vary channel.loss: is varied twice"),
+        (["seed=1,2"], "use --seeds"),
+        (["channel.los=0,0.3"], "channel.los = 0: there is no such field here; allowed are loss"),
+        (["channel.loss=0,1.5"], "channel.loss = 1.5: must be less than or equal to 1"),
+        (["channel.loss=little"], "channel.loss = 'little'"),
+        (["gains.k99=1,2"], "scheme containment has no gain 'k99'"),
+        (["faults.7.at=1,2"], "faults.7.at has 1 entries"),
+    ],
+)
+def test_a_study_that_cannot_fly_is_refused_before_it_begins(vary: list[str], because: str) -> None:
+    with pytest.raises(UserError, match=re.escape(because)):
+        plan_study("demo", vary)
+
+
+def test_all_combinations_fly_with_the_same_seeds(flown: tuple[Any, Path]) -> None:
+    rows = flown[0].select(["flight", "channel.loss", "gains.phi", "seed"]).to_pylist()
+    assert [tuple(row.values()) for row in rows] == [
+        (n, loss, phi, seed)
+        for n, (loss, phi, seed) in enumerate(
+            (loss, phi, seed) for loss in (0.0, 0.3) for phi in (0.1, TOO_STEEP) for seed in (5, 6)
+        )
+    ]
+
+
+def test_values_are_those_of_the_flight_alone(flown: tuple[Any, Path], scenario: Path) -> None:
+    row = next(row for row in flown[0].to_pylist() if row["channel.loss"] == 0.3 and row["seed"] == 6)
+    settings = ["channel.loss=0.3", "gains.phi=0.1"]
+    _, (altitude, hull, _) = claims_in_flight(load(scenario, settings=settings, seed=6))
+    assert [row["altitude, UAV 1"], row["altitude, UAV 2"]] == altitude.value
+    assert row["hull"] == hull.value
+    assert row["later"] is None
+    assert row["later holds"] is None
+    assert row["wall"] > 0.0
+
+
+def test_a_combination_that_is_refused_is_a_row_with_its_reason(flown: tuple[Any, Path]) -> None:
+    for row in flown[0].to_pylist():
+        if row["gains.phi"] == TOO_STEEP:
+            assert "unstable in Euler steps" in row["error"]
+            assert row["hull"] is None
+        else:
+            assert row["error"] is None
+            assert row["lost"] == []
+
+
+def test_only_bounds_are_judged_where_the_settings_are_not_those_of_the_case(flown: tuple[Any, Path]) -> None:
+    rows = [row for row in flown[0].to_pylist() if row["error"] is None]
+    assert {(row["channel.loss"], row["altitude holds"]) for row in rows} == {(0.0, True), (0.3, None)}
+    assert {(row["channel.loss"], row["hull holds"]) for row in rows} == {(0.0, False), (0.3, False)}
+
+
+def test_an_aircraft_that_is_lost_is_told_and_fails_its_claims(scenario: Path) -> None:
+    settings = ["start.uav.1.gamma=1.2", "plant.guards.flight_path_angle=1.0"]
+    study = plan_study(scenario, settings=settings, duration=SECONDS)
+    outcomes: list[Outcome] = []
+    assert fly_all(study, 1, outcomes.append)
+    (row,) = table(study, outcomes).to_pylist()
+    assert row["lost"] == [1]
+    assert row["error"].startswith("UAV 1 lost at ")
+    assert (row["altitude, UAV 1"], row["altitude holds"]) == (None, False)
+
+
+def test_the_table_says_units_tolerances_and_what_was_flown(flown: tuple[Any, Path]) -> None:
+    schema = flown[0].schema
+    assert schema.field("altitude, UAV 1").metadata == {
+        b"unit": b"m", b"meaning": b"mean of z over 0 to 2 s", b"expected": b"1005", b"tolerance": b"3",
+        b"source": b"test",
+    }  # fmt: skip
+    assert schema.metadata[b"ftcc.study"] == b"1"
+    assert schema.metadata[b"ftcc.case"] == b"flight"
+    assert (flown[1] / "study.png").stat().st_size > 10_000
+
+
+DEADLY = """
+import os, multiprocessing
+
+
+def check(gains, flight):
+    if multiprocessing.parent_process() is not None:
+        if gains.k_c == 2.0:
+            os._exit(7)
+        raise RuntimeError(f"k_c is {gains.k_c:g}")
+    return []
+"""
+
+
+def test_a_process_that_dies_and_an_exception_are_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    law = (EXAMPLE / "altitude_consensus.py").read_text()
+    install(EXAMPLE, tmp_path, {"deadly": law[: law.index("def check")] + DEADLY})
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(flights, "fly", lambda mission: None)  # nothing flies: nothing need be compiled
+    forget_schemes()
+    try:
+        study = plan_study(EXAMPLE / "consensus.toml", ["gains.k_c=1,2,3,4"], settings=["scheme=deadly"])
+        outcomes: list[Outcome] = []
+        assert fly_all(study, 2, outcomes.append)
+        errors = table(study, outcomes).column("error").to_pylist()
+    finally:
+        monkeypatch.undo()
+        forget_schemes()
+    assert errors[1] == "its process died"
+    assert [error.split(" (")[0] for error in (errors[0], *errors[2:])] == [
+        "RuntimeError: k_c is 1", "RuntimeError: k_c is 3", "RuntimeError: k_c is 4",
+    ]  # fmt: skip
+
+
+def test_ctrl_c_leaves_a_table_of_what_was_flown(scenario: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    with (tmp_path / "output.txt").open("w") as output:
+        study = subprocess.Popen(
+            [sys.executable, "-m", "ftcc.groundside.cli", "study", str(scenario), "--seeds", "100000", "--jobs", "2",
+             "--record", "--out", str(folder)],
+            stdout=output, stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, "COLUMNS": "200"},
+        )  # fmt: skip
+    wait_until(lambda: (folder / "runs" / "0003" / "signals.parquet").exists(), study)
+    workers = psutil.Process(study.pid).children(recursive=True)
+    os.killpg(study.pid, signal.SIGINT)
+    assert study.wait(60) == 1
+    text = (tmp_path / "output.txt").read_text()
+    assert "Traceback" not in text, text
+    assert re.search(r"\d+ of 100000 flights of 2 s .*interrupted", text), text
+    flown = pq.read_table(folder / "study.parquet").num_rows
+    assert 3 <= flown < 100000
+    assert (folder / "study.png").exists()
+    _, alive = psutil.wait_procs(workers, timeout=30)
+    assert not alive
+
+
+def wait_until(condition: Callable[[], bool], process: subprocess.Popen[bytes], seconds: float = 120.0) -> None:
+    until = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, "ended before its time"
+        assert time.monotonic() < until
+        time.sleep(0.02)
