@@ -33,6 +33,7 @@ __all__ = [
     "fields",
     "fill",
     "instantiate",
+    "moved",
     "refusal",
     "store",
     "uncompile",
@@ -84,7 +85,6 @@ from numba.core import types  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import overload  # noqa: E402
-from numba.np.unsafe.ndarray import to_fixed_tuple  # noqa: E402
 
 
 def compiled(function: F) -> F:
@@ -185,9 +185,7 @@ def _fields_compiled(cls, values):
     if not isinstance(cls, types.NamedTupleClass):
         return None
     kind: Any = cls.instance_class
-    size = width(kind)
-    if size == len(kind._fields):
-        return lambda cls, values: kind(*to_fixed_tuple(values, size))
+    # Entry by entry: to_fixed_tuple takes 10 ns for each.
     made = []
     for at, end, what in _layout(kind):
         if isinstance(what, Room):
@@ -242,6 +240,19 @@ def _store_compiled(record, values):
     made: dict[str, Any] = {}
     exec("\n".join(lines), made)
     return made["store_fields"]
+
+
+def moved(state: Any, h: float, rates: Any) -> Any:
+    """``state`` + ``h`` * ``rates``, a NamedTuple of floats: stays in registers, where an array would be slow."""
+    return type(state)(*(x + h * rate for x, rate in zip(state, rates, strict=True)))
+
+
+@overload(moved)
+def _moved_compiled(state, h, rates):
+    terms = ", ".join(f"state[{n}] + h * rates[{n}]" for n in range(state.count))
+    made: dict[str, Any] = {"kind": state.instance_class}
+    exec(f"def moved_entries(state, h, rates):\n    return kind({terms})", made)
+    return made["moved_entries"]
 
 
 @compiled

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
-from ftcc.link.compiled import compiled, fields, fill, store
+from ftcc.link.compiled import compiled, fields, fill, moved
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
@@ -49,41 +49,31 @@ def actuate(fleet, i, time):
 
 
 @compiled
-def _drive(fleet, i, time, step):
-    """Set what acts during a step whose middle is at ``time`` (s)."""
-    inputs = fleet.inputs[i]
-    _hold_speed(fleet, i)
-    for slot in _SLOTS:
-        inputs[0, slot], inputs[1, slot], inputs[2, slot] = stroke(fleet, i, slot, time, step)
-    for channel in range(_CHANNELS):
-        fleet.disturbed[i, channel] = disturbance(fleet, i, channel, time)
+def _stroke(fleet, i, slot, time, step):
+    if slot in _SLOTS:  # known when compiled
+        return stroke(fleet, i, slot, time, step)
+    return 0.0, 0.0, 0.0
 
 
 @compiled
-def _step(fleet, i, h):
-    """One step of RK4 of ``h`` (s)."""
-    x, stages = fleet.state[i], fleet.stages[i]
-    stage, r1, r2, r3, r4 = stages[0], stages[1], stages[2], stages[3], stages[4]
-    parameters = fields(_Parameters, fleet.airframe[i])
+def _step(fleet, i, parameters, time, h):
+    """One step of RK4 of ``h`` (s) whose middle is at ``time`` (s)."""
+    _hold_speed(fleet, i)
+    a0, a1, a2 = _stroke(fleet, i, 0, time, h)
+    b0, b1, b2 = _stroke(fleet, i, 1, time, h)
+    c0, c1, c2 = _stroke(fleet, i, 2, time, h)
+    d0, d1, d2 = _stroke(fleet, i, 3, time, h)
+    begin, middle, end = _Inputs(a0, b0, c0, d0), _Inputs(a1, b1, c1, d1), _Inputs(a2, b2, c2, d2)
+    for channel in range(_CHANNELS):
+        fleet.disturbed[i, channel] = disturbance(fleet, i, channel, time)
     d = fields(_Disturbances, fleet.disturbed[i])
-    begin, middle, end = (
-        fields(_Inputs, fleet.inputs[i, 0]),
-        fields(_Inputs, fleet.inputs[i, 1]),
-        fields(_Inputs, fleet.inputs[i, 2]),
-    )
-    k = 0.5 * h
-    size = x.shape[0]
-    store(_rates(fields(_State, x), begin, d, parameters), r1)
-    for j in range(size):
-        stage[j] = x[j] + k * r1[j]
-    store(_rates(fields(_State, stage), middle, d, parameters), r2)
-    for j in range(size):
-        stage[j] = x[j] + k * r2[j]
-    store(_rates(fields(_State, stage), middle, d, parameters), r3)
-    for j in range(size):
-        stage[j] = x[j] + h * r3[j]
-    store(_rates(fields(_State, stage), end, d, parameters), r4)
-    for j in range(size):
+    x = fleet.state[i]
+    s = fields(_State, x)
+    r1 = _rates(s, begin, d, parameters)
+    r2 = _rates(moved(s, 0.5 * h, r1), middle, d, parameters)
+    r3 = _rates(moved(s, 0.5 * h, r2), middle, d, parameters)
+    r4 = _rates(moved(s, h, r3), end, d, parameters)
+    for j in range(len(s)):
         x[j] += h / 6.0 * (r1[j] + 2.0 * r2[j] + 2.0 * r3[j] + r4[j])
 
 
@@ -99,10 +89,10 @@ def advance(fleet, i, start_us, period_us, step_us):
     if fleet.point[i] == 1:
         return 0
     guards = fields(Guards, fleet.guards[i])
+    parameters = fields(_Parameters, fleet.airframe[i])
     h = step_us / 1e6
     for n in range(period_us // step_us):
-        _drive(fleet, i, (start_us + n * step_us + step_us // 2) / 1e6, h)
-        _step(fleet, i, h)
+        _step(fleet, i, parameters, (start_us + n * step_us + step_us // 2) / 1e6, h)
         why = _lost(fields(_State, fleet.state[i]), guards)
         if why > 0:
             return why

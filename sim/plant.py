@@ -155,14 +155,10 @@ class Fleet(NamedTuple):
     """(k, n): 1 once a vehicle has entered the zone."""
     happenings: Happenings
     """What is to be told; the kinds are those of `obstacles`."""
-    inputs: NDArray[np.float64]
-    """(k, 3, 4): room for what acts at the beginning, middle and end of an integration step."""
     autothrottle: NDArray[np.float64]
     """(k, 4): see `Autothrottle`, then the thrust that it asks for at present, N."""
     disturbed: NDArray[np.float64]
     """(k, d): room for the disturbances of a step."""
-    stages: NDArray[np.float64]
-    """(k, 5, n): room for the stages of the integration: a state and four times its rates."""
 
 
 @compiled

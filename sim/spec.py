@@ -97,8 +97,6 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         zones=zones_of(specs[0].obstacles),
         entered=np.zeros((k, len(specs[0].obstacles)), np.int64),
         happenings=new_happenings(),
-        inputs=np.zeros((k, 3, len(ACTUATORS))),
         autothrottle=np.array([(*spec.autothrottle, spec.autothrottle.thrust) for spec in specs], np.float64),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
-        stages=np.zeros((k, 5, len(plant.State._fields))),
     )

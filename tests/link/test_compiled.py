@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import ftcc.link
-from ftcc.link.compiled import Room, Vector, compiled, copy, fields, fill, instantiate, store, width
+from ftcc.link.compiled import Room, Vector, compiled, copy, fields, fill, instantiate, moved, store, width
 from tests.swarm import AIRFRAME
 
 REPOSITORY = Path(__file__).parents[2]
@@ -133,7 +133,7 @@ def test_a_template_gives_instances_of_its_own(tmp_path, monkeypatch):
     assert instantiate("template_of_a_test", "half", element=square) is first, "a name stands for one instance"
 
 
-@pytest.mark.parametrize("template", ["ftcc.airside.tick", "ftcc.groundside.flight_loop"])
+@pytest.mark.parametrize("template", ["ftcc.airside.tick", "ftcc.sim.cycle", "ftcc.groundside.flight_loop"])
 def test_a_template_says_what_it_is_when_imported_plainly(template):
     with pytest.raises(ImportError, match="is a template: use"):
         __import__(template)
@@ -157,6 +157,24 @@ def test_copy_and_fill():
     assert target.tolist() == [1.0, 2.0, 3.0, 0.0, 0.0]
     fill(target, 7.0)
     assert (target == 7.0).all()
+
+
+class Plane(NamedTuple):
+    x: float
+    z: float
+
+
+@compiled
+def _moved(values):
+    state = fields(Plane, values)
+    store(moved(state, 0.5, (state.z, 3.0)), values)
+
+
+@pytest.mark.parametrize("function", [_moved, getattr(_moved, "py_func", _moved)], ids=["compiled", "plain"])
+def test_a_record_moves_along_its_rates(function):
+    values = np.array([1.0, 2.0])
+    function(values)
+    assert values.tolist() == [2.0, 3.5]
 
 
 class Mixed(NamedTuple):
