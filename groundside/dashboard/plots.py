@@ -11,8 +11,9 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.airside.scheme import Quantity
-from ftcc.groundside.dashboard.scene import GRAY, Color, colors, faults, name
+from ftcc.groundside.dashboard.scene import faults, name
 from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.palette import GRAY, Color, colors
 from ftcc.groundside.snapshot import Event, Snapshot
 
 __all__ = ["Plots", "tracking_errors"]

@@ -5,7 +5,6 @@ The world's axes are east, north and up, which are right-handed; x (north) and y
 
 from __future__ import annotations
 
-import colorsys
 import math
 from collections.abc import Mapping, Sequence
 
@@ -15,37 +14,18 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, Color, colors
 from ftcc.groundside.snapshot import LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 
-__all__ = ["CUT", "FRESH", "GRAY", "STALE", "TRAIL", "Color", "Scene", "colors", "faults", "name"]
-
-Color = tuple[int, int, int]
-
-GRAY: Color = (128, 132, 138)
-FRESH: Color = (122, 134, 126)
-STALE: Color = (224, 160, 20)
-CUT: Color = (226, 48, 48)
-"""Edges over which the receiver hears news, hears none, and cannot hear any."""
+__all__ = ["LANE", "TRAIL", "Scene", "faults", "name"]
 
 TRAIL = 5.0
 """Length of the trails, s."""
 LANE = 12.0
 """Distance at which aircraft that fly above one another are drawn side by side, m."""
-
-_PALETTE: tuple[Color, ...] = (
-    (72, 126, 216),
-    (200, 116, 48),
-    (64, 160, 88),
-    (206, 84, 148),
-    (138, 104, 206),
-    (34, 158, 166),
-    (146, 140, 40),
-    (108, 120, 148),
-)
-"""Middle tones, readable on white and on black; red and amber are left to the edges."""
 
 # Airframe, m: x forward, y right, z down; corners of flat parts, each a fan of triangles.
 _SPAN = 3.24
@@ -66,15 +46,6 @@ _NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 def name(uav: int) -> str:
     """What a UAV is called everywhere."""
     return f"UAV {uav}"
-
-
-def colors(uavs: Sequence[int]) -> dict[int, Color]:
-    """One colour for each UAV; beyond eight, hues a golden angle apart."""
-    chosen = dict(zip(sorted(uavs), _PALETTE, strict=False))
-    for i, uav in enumerate(sorted(uavs)[len(_PALETTE) :]):
-        r, g, b = colorsys.hls_to_rgb((0.09 + 0.618034 * i) % 1.0, 0.5, 0.45)
-        chosen[uav] = (int(255 * r), int(255 * g), int(255 * b))
-    return chosen
 
 
 def faults(uav: UavState) -> str:

@@ -19,8 +19,9 @@ import pytest
 import rerun as rr
 
 from ftcc.groundside.dashboard import Dashboard
-from ftcc.groundside.dashboard.scene import CUT, FRESH, GRAY, LANE, STALE, colors
+from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
+from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
 from ftcc.groundside.snapshot import Snapshot, UavState
 from tests.groundside.synthetic_swarm import (
     CUT as CUT_FROM_TO,

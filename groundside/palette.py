@@ -1,0 +1,43 @@
+"""Colours, the same in the dashboard and in the figures: middle tones, readable on white and on black."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Iterable
+
+__all__ = ["CUT", "FRESH", "GRAY", "STALE", "Color", "colors", "hexadecimal"]
+
+Color = tuple[int, int, int]
+
+GRAY: Color = (128, 132, 138)
+"""Bounds, limits and what belongs to nobody."""
+FRESH: Color = (122, 134, 126)
+STALE: Color = (224, 160, 20)
+CUT: Color = (226, 48, 48)
+"""Edges over which the receiver hears news, hears none, and cannot hear any."""
+
+_PALETTE: tuple[Color, ...] = (
+    (72, 126, 216),
+    (200, 116, 48),
+    (64, 160, 88),
+    (206, 84, 148),
+    (138, 104, 206),
+    (34, 158, 166),
+    (146, 140, 40),
+    (108, 120, 148),
+)
+"""Of UAVs; red and amber are left to the edges."""
+
+
+def colors(uavs: Iterable[int]) -> dict[int, Color]:
+    """One colour for each UAV; beyond eight, hues a golden angle apart."""
+    chosen = dict(zip(sorted(uavs), _PALETTE, strict=False))
+    for i, uav in enumerate(sorted(uavs)[len(_PALETTE) :]):
+        r, g, b = colorsys.hls_to_rgb((0.09 + 0.618034 * i) % 1.0, 0.5, 0.45)
+        chosen[uav] = (int(255 * r), int(255 * g), int(255 * b))
+    return chosen
+
+
+def hexadecimal(color: Color) -> str:
+    """``#rrggbb``."""
+    return "#{:02x}{:02x}{:02x}".format(*color)

@@ -1,0 +1,159 @@
+"""What the figures of a scheme are: sheets of figures as data, and figures for a scheme without a sheet.
+
+A sheet, ``figures/SCHEME.toml``, lists the figures of the monograph's chapter with their quantities, and what the
+monograph reads off them, so that a run can be held against it.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from ftcc.groundside.errors import UserError
+from ftcc.groundside.metrics import DERIVED, check_expression
+from ftcc.groundside.schema import Id, Strict
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of"]
+
+_FOLDER = Path(__file__).parent / "figures"
+
+Uavs = list[Id] | Literal["followers", "leaders", "all"]
+
+
+class Panel(Strict):
+    """One pair of axes: an expression over the recording's columns, a curve per UAV."""
+
+    y: str
+    label: str
+    unit: str = Field("", description="of y")
+    x: str = "t"
+    x_label: str = "t"
+    x_unit: str = "s"
+    uavs: Uavs = "followers"
+    pairs: list[tuple[Id, Id]] | None = Field(None, description="draw y of the first minus y of the second instead")
+    bound: str | None = Field(None, description="expression; drawn dashed at plus and minus its value")
+    true: str | None = Field(None, description="expression of the true value that y estimates; drawn thin and dark")
+    limits: str | None = Field(None, description="actuator whose limits are drawn")
+    window: tuple[float, float] | None = Field(None, description="s; a detail, beside the others")
+    shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
+
+
+class Reading(Strict):
+    """What the monograph reads off a figure, held against the extremes of an expression in a window."""
+
+    what: str
+    y: str
+    uavs: Uavs = "followers"
+    pairs: list[tuple[Id, Id]] | None = None
+    window: tuple[float, float] | None = Field(None, description="s; default: the whole flight")
+    unit: str = ""
+    monograph: tuple[float, float] = Field(description="lowest and highest value")
+    kind: Literal["extremes", "within"] = Field(
+        "extremes", description='"extremes": values that are reached; "within": an axis or a bound that holds them'
+    )
+    remark: str = Field("", description="a difference that is known, and its cause")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.monograph[0] > self.monograph[1]:
+            raise ValueError(f"monograph = {list(self.monograph)}: the lower value first")
+        return self
+
+
+class Figure(Strict):
+    """A figure: panels below one another, details beside each other under them."""
+
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="of its files")
+    title: str
+    number: str = Field("", description="in the monograph")
+    panels: list[Panel] = Field(min_length=1)
+    readings: list[Reading] = []
+
+
+class Sheet(Strict):
+    """The figures of a scheme."""
+
+    source: str = Field("", description="chapter of the monograph")
+    scenarios: list[str] = Field([], description="names of the scenarios that fly what the monograph shows")
+    figures: list[Figure] = Field(min_length=1)
+    notes: list[str] = Field([], description="what of the monograph is not drawn or cannot be compared, and why")
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Read a sheet.
+
+    Raises
+    ------
+    UserError
+        That names the file, the field and the value.
+    """
+    try:
+        return Sheet.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path}: is no TOML: {error}") from None
+    except ValidationError as error:
+        wrong = "\n".join(f"  {'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors())
+        raise UserError(f"{path}:\n{wrong}") from None
+
+
+def sheet_of(mission: Mission) -> Sheet:
+    """The sheet of a mission's scheme: the one that is shipped, or a plain one."""
+    path = _FOLDER / f"{mission.scheme.name}.toml"
+    return read_sheet(path) if path.is_file() else plain_sheet(mission)
+
+
+_PLANES = {
+    "longitudinal": (("z", "altitude", "m"), ("V", "airspeed", "m/s"), ("gamma", "flight-path angle", "rad")),
+    "attitude": (("mu", "bank", "rad"), ("alpha", "angle of attack", "rad"), ("beta", "sideslip", "rad")),
+    "position": (("x", "north", "m"), ("y", "east", "m"), ("z", "altitude", "m"), ("V", "airspeed", "m/s")),
+}
+"""What tells how an aircraft flies, by plant."""
+
+
+def plain_sheet(mission: Mission) -> Sheet:
+    """Figures from what a scheme declares: motion, errors with their bounds, commands with their limits, estimates."""
+    motion = [
+        Panel(y=name, label=meaning, unit=unit, uavs="all") for name, meaning, unit in _PLANES[mission.scheme.plant]
+    ]
+    figures = [Figure(name="motion", title="Motion", panels=motion)]
+    errors, estimates = [], []
+    for signal in mission.scheme.signals:
+        panel = Panel(y=signal.name, label=signal.meaning or signal.name, unit=signal.unit)
+        if signal.bound is not None:
+            errors.append(panel.model_copy(update={"bound": str(signal.bound)}))
+        elif "error" in signal.meaning:
+            errors.append(panel)
+        elif signal.name.endswith("_hat"):
+            estimates.append(panel)
+    for name, title, panels in (("errors", "Errors", errors), ("estimates", "Estimates", estimates)):
+        if panels:
+            figures.append(Figure(name=name, title=title, panels=panels))
+    commands = [
+        Panel(y=f"{name}_command", label=f"{name} command", unit="N" if name == "thrust" else "rad", limits=name)
+        for name in mission.scheme.commands
+    ]
+    figures.append(Figure(name="commands", title="Commands", panels=commands))
+    return Sheet(figures=figures)
+
+
+def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
+    """What is wrong with a sheet's expressions, given the columns of a recording."""
+    wrong = []
+    for figure in sheet.figures:
+        told = [*figure.panels, *figure.readings]
+        expressions = [one.y for one in told]
+        expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true) if e is not None]
+        for expression in dict.fromkeys(expressions):
+            try:
+                check_expression(expression, [*columns, *DERIVED])
+            except ValueError as error:
+                wrong.append(f"figure {figure.name}: {error}")
+    return wrong

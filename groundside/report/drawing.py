@@ -1,0 +1,357 @@
+"""Draws figures with matplotlib, all in one style: SVG for the page, PDF and PNG for papers and slides."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+
+matplotlib.use("Agg")  # figures go into files; no window, no display
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from ftcc.groundside.metrics import Signals, evaluated, names_in, window_of
+from ftcc.groundside.palette import GRAY, colors, hexadecimal
+from ftcc.groundside.report.definitions import Figure, Panel
+from ftcc.link.actuators import ACTUATORS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["Drawn", "Flown", "curves_of", "drawable", "draw", "draw_timeline", "save"]
+
+Array = NDArray[np.float64]
+
+_INK = "#010203"
+"""Stands for the colour of text: the page replaces it by its own, so that a figure suits light and dark."""
+_WIDTH, _ROW, _LEGEND = 7.2, 1.9, 0.35
+"""Inches: of a figure, of a row of panels, of the legend."""
+_IN_A_ROW = 3
+"""Details beside each other."""
+_COLUMNS = 700
+"""Columns of a figure's width, of each of which the least and the greatest value are drawn."""
+_RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
+"""Of runs that are compared."""
+
+_STYLE: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": _INK,
+    "axes.labelcolor": _INK,
+    "axes.grid": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 5),
+    "grid.color": "#808890",
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.5,
+    "text.color": _INK,
+    "xtick.color": _INK,
+    "ytick.color": _INK,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "lines.linewidth": 1.0,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "ftcc",
+    "pdf.fonttype": 42,
+    "savefig.transparent": True,
+}
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight to draw."""
+
+    label: str
+    signals: Signals
+    mission: Mission
+    happened: tuple[float, ...] = ()
+    """Times of events, s."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure that was drawn."""
+
+    name: str
+    title: str
+    number: str
+    svg: str
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a panel."""
+
+    who: str
+    uav: int
+    x: Array
+    y: Array
+
+
+def drawable(panel: Panel, flight: Flown) -> bool:
+    """Whether a flight has all columns of a panel, and reaches its window."""
+    asked = set[str]()
+    for expression in (panel.y, panel.x, panel.bound, panel.true):
+        asked |= names_in(expression) if expression is not None else set()
+    known = {*flight.signals.names, "t", *derived_names(flight)}
+    if not asked <= known:
+        return False
+    return panel.window is None or _last(flight) >= panel.window[0]
+
+
+def derived_names(flight: Flown) -> set[str]:
+    """Derived columns that can be had for a flight."""
+    from ftcc.groundside.metrics import DERIVED
+
+    return set(DERIVED)
+
+
+def _last(flight: Flown) -> float:
+    times = [flight.signals.column("t", uav) for uav in flight.signals.uavs]
+    return max((float(t[-1]) for t in times if len(t)), default=-1.0)
+
+
+def uavs_of(uavs: Sequence[int] | str, mission: Mission) -> tuple[int, ...]:
+    """Ids for "followers", "leaders", "all" or a list."""
+    if isinstance(uavs, str):
+        graph = mission.graph
+        return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[uavs]
+    return tuple(uav for uav in uavs if uav in mission.uavs)
+
+
+def curves_of(
+    y: str,
+    flight: Flown,
+    uavs: Sequence[int] | str,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    window: tuple[float, float] | None = None,
+    x: str = "t",
+) -> Iterator[Curve]:
+    """An expression over a flight, a curve per UAV (or per pair: the difference); only where there are rows."""
+    graph = flight.mission.graph
+    whom = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
+    for uav, other in whom:
+        t = flight.signals.column("t", uav)
+        if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
+            continue
+        values = evaluated(y, flight.signals, graph, uav)
+        who = f"UAV {uav}"
+        if other is not None:
+            theirs = evaluated(y, flight.signals, graph, other)
+            rows = min(len(values), len(theirs))
+            t, values, who = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
+        along = t if x == "t" else evaluated(x, flight.signals, graph, uav)[: len(t)]
+        rows_ = window_of(t, window) if window is not None else slice(None)
+        if len(t[rows_]):
+            yield Curve(who, uav, along[rows_], values[rows_])
+
+
+def draw(figure: Figure, flights: Sequence[Flown]) -> Any | None:
+    """A figure of one flight, colours by UAV, or of several, colours by flight; None if none has what it shows."""
+    panels = [panel for panel in figure.panels if any(drawable(panel, flight) for flight in flights)]
+    if not panels:
+        return None
+    with plt.rc_context(_STYLE):
+        wide = [i for i, panel in enumerate(panels) if panel.window is None]
+        details = [i for i, panel in enumerate(panels) if panel.window is not None]
+        rows: list[list[int]] = [[i] for i in wide]
+        rows += [details[i : i + _IN_A_ROW] for i in range(0, len(details), _IN_A_ROW)]
+        columns = int(np.lcm.reduce([len(row) for row in rows]))
+        mosaic = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
+        height = _LEGEND + _ROW * len(rows)
+        made, axes = plt.subplot_mosaic(mosaic, figsize=(_WIDTH, height), layout="constrained")
+        for i, panel in enumerate(panels):
+            _draw_panel(axes[str(i)], panel, flights)
+        _legend(made, panels, flights)
+    return made
+
+
+def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
+    several = len(flights) > 1
+    for n, flight in enumerate(flights):
+        if not drawable(panel, flight):
+            continue
+        tints = colors(flight.mission.uavs)
+        leaders = flight.mission.graph.leaders
+        for k, curve in enumerate(curves_of(panel.y, flight, panel.uavs, panel.pairs, panel.window, panel.x)):
+            color = hexadecimal(_RUN_COLORS[n % len(_RUN_COLORS)] if several else tints[curve.uav])
+            if panel.pairs is not None and not several:
+                color = hexadecimal(colors(range(1, len(panel.pairs) + 1))[k + 1])
+            style = "--" if curve.uav in leaders and panel.pairs is None else "-"
+            axes.plot(*_thinned(curve.x, curve.y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
+            if panel.shared:
+                break
+        if n == 0:
+            _draw_bounds(axes, panel, flight)
+    if panel.limits is not None and panel.limits in ACTUATORS:
+        follower = next(spec for spec in flights[0].mission.vehicles if spec.kind != "reference_point")
+        for limit in follower.limits[ACTUATORS.index(panel.limits)]:
+            axes.axhline(limit, color=hexadecimal(GRAY), linewidth=0.8, linestyle=":")
+    if panel.x == "t" and not several:
+        _mark_events(axes, panel, flights[0])
+    unit = f", {_pretty(panel.unit)}" if panel.unit and panel.unit != "-" else ""
+    axes.set(xlabel=f"{panel.x_label}, {_pretty(panel.x_unit)}", ylabel=f"{panel.label}{unit}")
+    axes.margins(x=0.01)
+
+
+def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
+    """Bounds dashed, both ways; true values dotted in the colour of text."""
+    if panel.bound is not None:
+        for curve in curves_of(panel.bound, flight, panel.uavs, None, panel.window, panel.x):
+            x, y = _thinned(curve.x, np.abs(curve.y))
+            for sign in (1.0, -1.0):
+                axes.plot(x, sign * y, "--", color=hexadecimal(GRAY), linewidth=0.8, zorder=2)
+    if panel.true is not None:
+        for curve in curves_of(panel.true, flight, panel.uavs, None, panel.window, panel.x):
+            axes.plot(*_thinned(curve.x, curve.y), ":", color=_INK, linewidth=0.9, zorder=5)
+
+
+def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
+    last = _last(flight)
+    low, high = panel.window or (0.0, last)
+    for t in flight.happened:
+        if low < t < min(high, last):
+            axes.axvline(t, color=hexadecimal(GRAY), alpha=0.45, linewidth=0.7, zorder=1)
+
+
+def _legend(made: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> None:
+    entries: list[Line2D] = []
+    if len(flights) > 1:
+        entries += [
+            Line2D([], [], color=hexadecimal(_RUN_COLORS[n % len(_RUN_COLORS)]), label=flight.label)
+            for n, flight in enumerate(flights)
+        ]
+    else:
+        entries += _uav_entries(panels, flights[0])
+    gray = hexadecimal(GRAY)
+    if any(panel.bound for panel in panels):
+        entries.append(Line2D([], [], color=gray, linestyle="--", label="bound"))
+    if any(panel.limits for panel in panels):
+        entries.append(Line2D([], [], color=gray, linestyle=":", label="limit"))
+    if any(panel.true for panel in panels):
+        entries.append(Line2D([], [], color=_INK, linestyle=":", label="true value"))
+    if entries:
+        made.legend(handles=entries, loc="outside upper center", ncols=min(len(entries), 8), handlelength=1.6)
+
+
+def _uav_entries(panels: Sequence[Panel], flight: Flown) -> list[Line2D]:
+    pairs = next((panel.pairs for panel in panels if panel.pairs is not None), None)
+    if pairs is not None:
+        tints = colors(range(1, len(pairs) + 1))
+        return [
+            Line2D([], [], color=hexadecimal(tints[k]), label=f"UAV {a} less UAV {b}")
+            for k, (a, b) in enumerate(pairs, 1)
+        ]
+    shown = sorted({uav for panel in panels if not panel.shared for uav in uavs_of(panel.uavs, flight.mission)})
+    tints = colors(flight.mission.uavs)
+    leaders = flight.mission.graph.leaders
+    return [
+        Line2D(
+            [],
+            [],
+            color=hexadecimal(tints[uav]),
+            linestyle="--" if uav in leaders else "-",
+            label=f"UAV {uav}" + (" (leader)" if uav in leaders else ""),
+        )
+        for uav in shown
+    ]
+
+
+def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: float) -> Any | None:
+    """Events by time, a row per UAV and one for what concerns all; None if nothing happened."""
+    marked = [event for event in events if 0.0 <= float(event["t"]) <= max(last, 0.0)]
+    if not marked:
+        return None
+    rows = [None, *mission.uavs]
+    places = {uav: -i for i, uav in enumerate(rows)}
+    tints = {"info": GRAY, "warning": (214, 140, 20), "error": (214, 48, 48)}
+    shapes = {"info": "o", "warning": "D", "error": "X"}
+    with plt.rc_context(_STYLE):
+        made, axes = plt.subplots(figsize=(_WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
+        for event in marked:
+            uav = event.get("uav")
+            severity = str(event.get("severity", "info"))
+            axes.plot(
+                [float(event["t"])],
+                [places.get(int(uav) if uav is not None else None, 0)],
+                shapes.get(severity, "o"),
+                color=hexadecimal(tints.get(severity, GRAY)),
+                markersize=5.5,
+                zorder=3,
+            )
+        axes.set_yticks([-i for i in range(len(rows))], ["swarm", *(f"UAV {uav}" for uav in mission.uavs)])
+        axes.set(xlabel="t, s", xlim=(-0.01 * last, 1.01 * last), ylim=(0.6 - len(rows), 0.6))
+        axes.spines["left"].set_visible(False)
+        axes.tick_params(left=False)
+    return made
+
+
+def save(made: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
+    """Write a figure as SVG, PDF and PNG, and close it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    buffer = io.StringIO()
+    files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
+    with plt.rc_context(_STYLE):
+        made.savefig(buffer, format="svg", metadata={"Date": None})
+        files[0].write_text(_small(buffer.getvalue()), encoding="utf-8")
+        made.savefig(files[1], metadata={"CreationDate": None})
+        made.savefig(files[2], dpi=160, transparent=False)
+    plt.close(made)
+    return Drawn(name, title, number, _for_page(files[0].read_text(encoding="utf-8"), title, name), files)
+
+
+def _small(svg: str) -> str:
+    """Coordinates to a tenth of a point."""
+    return re.sub(r"(\d+\.\d)\d+", r"\1", svg)
+
+
+def _for_page(svg: str, title: str, name: str) -> str:
+    """An SVG as an element of a page: text in the page's colour, ids of its own, a title for those who cannot see it."""
+    body = svg[svg.index("<svg") :].replace(_INK, "currentColor")
+    body = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', body)
+    body = re.sub(r'(xlink:href="|url\()#', rf"\1#{name}-", body)
+    return re.sub(
+        r"<svg([^>]*?) (width|height)=\"[^\"]*\"([^>]*?)>",
+        rf'<svg\1\3 role="img" aria-label="{title}">',
+        body,
+        count=1,
+    )
+
+
+def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
+    """A curve's least and greatest value in each of `_COLUMNS` parts: looks the same, and is small."""
+    if len(y) <= 2 * _COLUMNS:
+        return x, y
+    edges = np.linspace(0, len(y), _COLUMNS + 1).astype(int)
+    kept = []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        part = y[a:b]
+        if np.isfinite(part).any():
+            low, high = a + int(np.nanargmin(part)), a + int(np.nanargmax(part))
+            kept += [min(low, high), max(low, high)] if low != high else [low]
+        else:
+            kept.append(a)
+    kept = sorted({0, *kept, len(y) - 1})
+    return x[kept], y[kept]
+
+
+def _pretty(unit: str) -> str:
+    return unit.replace("^2", "\u00b2")
