@@ -168,11 +168,11 @@ def report(
     json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON.")] = False,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
     mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
-    figures: Annotated[bool, typer.Option("--figures", help="Draw the flight into RUN/report.")] = False,
+    page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
 ) -> None:
     """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
     from ftcc.groundside.claims import failed
-    from ftcc.groundside.report import as_json, claims_of, draw, show
+    from ftcc.groundside.report import as_json, claims_of, show
     from ftcc.groundside.run import Run, RunError
 
     recorded = Run(run)
@@ -190,11 +190,42 @@ def report(
             except OSError as error:
                 raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
             written.print(f"wrote {file}", highlight=False, soft_wrap=True)
-    if figures:
-        for file in draw(recorded):
-            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    if page and not json:
+        from ftcc.groundside.report.report import write_report
+
+        written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
     if failed(results):
         raise typer.Exit(1)
+
+
+@app.command()
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of runs of one scheme.")],
+    out: Annotated[Path, typer.Option(help="Folder of the page and its figures.")] = Path("runs/compared"),
+) -> None:
+    """Lay runs over each other: the same figures with a colour per run, and one table of claims."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from ftcc.groundside.report.comparison import Comparison
+    from ftcc.groundside.run import Run, RunError
+
+    if len(runs) < 2:
+        raise RunError("compare needs two runs or more")
+    comparison = Comparison([Run(path) for path in runs])
+    heads, rows = comparison.rows()
+    table = Table(header_style="bold", pad_edge=False)
+    for head in heads:
+        table.add_column(head.text, justify="right" if head.number else "left", overflow="fold")
+    styles = {"holds": "green", "fails": "bold red", "open": "dim"}
+    for row in rows:
+        table.add_row(*(Text(cell.text, styles.get(cell.mark, "")) for cell in row))
+    terminal().print(table)
+    try:
+        page = comparison.write(out)
+    except OSError as error:
+        raise RunError(f"--out {out}: cannot be written: {error.strerror or error}") from None
+    terminal(stderr=True).print(f"wrote {page}", highlight=False, soft_wrap=True)
 
 
 cli_fly.register(app)

@@ -1,5 +1,5 @@
-"""What a run showed: claims on the terminal and as JSON, figures."""
+"""What a run showed: claims on the terminal and as JSON; a page with figures, see `report`, which loads matplotlib."""
 
-from ftcc.groundside.report.terminal import as_json, claims_of, claims_table, draw, show, show_claims, summary
+from ftcc.groundside.report.terminal import as_json, claims_of, claims_table, show, show_claims, summary
 
-__all__ = ["as_json", "claims_of", "claims_table", "draw", "show", "show_claims", "summary"]
+__all__ = ["as_json", "claims_of", "claims_table", "show", "show_claims", "summary"]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ftcc.groundside.mission import Mission
 
-__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of"]
+__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of", "unknown_columns"]
 
 _FOLDER = Path(__file__).parent / "figures"
 
@@ -148,8 +148,7 @@ def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
     """What is wrong with a sheet's expressions, given the columns of a recording."""
     wrong = []
     for figure in sheet.figures:
-        told = [*figure.panels, *figure.readings]
-        expressions = [one.y for one in told]
+        expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]
         expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true) if e is not None]
         for expression in dict.fromkeys(expressions):
             try:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,8 @@ from matplotlib import pyplot as plt
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ftcc.groundside.metrics import Signals, evaluated, names_in, window_of
 from ftcc.groundside.palette import GRAY, colors, hexadecimal
+from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
 from ftcc.groundside.report.definitions import Figure, Panel
 from ftcc.link.actuators import ACTUATORS
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from ftcc.groundside.mission import Mission
 
-__all__ = ["Drawn", "Flown", "curves_of", "drawable", "draw", "draw_timeline", "save"]
+__all__ = ["Drawn", "draw", "draw_timeline", "save"]
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ _COLUMNS = 700
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
 """Of runs that are compared."""
 
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 8.0,
     "axes.titlesize": 8.0,
@@ -75,17 +76,6 @@ _STYLE: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Flown:
-    """A flight to draw."""
-
-    label: str
-    signals: Signals
-    mission: Mission
-    happened: tuple[float, ...] = ()
-    """Times of events, s."""
-
-
-@dataclass(frozen=True)
 class Drawn:
     """A figure that was drawn."""
 
@@ -94,74 +84,6 @@ class Drawn:
     number: str
     svg: str
     files: tuple[Path, ...]
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One curve of a panel."""
-
-    who: str
-    uav: int
-    x: Array
-    y: Array
-
-
-def drawable(panel: Panel, flight: Flown) -> bool:
-    """Whether a flight has all columns of a panel, and reaches its window."""
-    asked = set[str]()
-    for expression in (panel.y, panel.x, panel.bound, panel.true):
-        asked |= names_in(expression) if expression is not None else set()
-    known = {*flight.signals.names, "t", *derived_names(flight)}
-    if not asked <= known:
-        return False
-    return panel.window is None or _last(flight) >= panel.window[0]
-
-
-def derived_names(flight: Flown) -> set[str]:
-    """Derived columns that can be had for a flight."""
-    from ftcc.groundside.metrics import DERIVED
-
-    return set(DERIVED)
-
-
-def _last(flight: Flown) -> float:
-    times = [flight.signals.column("t", uav) for uav in flight.signals.uavs]
-    return max((float(t[-1]) for t in times if len(t)), default=-1.0)
-
-
-def uavs_of(uavs: Sequence[int] | str, mission: Mission) -> tuple[int, ...]:
-    """Ids for "followers", "leaders", "all" or a list."""
-    if isinstance(uavs, str):
-        graph = mission.graph
-        return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[uavs]
-    return tuple(uav for uav in uavs if uav in mission.uavs)
-
-
-def curves_of(
-    y: str,
-    flight: Flown,
-    uavs: Sequence[int] | str,
-    pairs: Sequence[tuple[int, int]] | None = None,
-    window: tuple[float, float] | None = None,
-    x: str = "t",
-) -> Iterator[Curve]:
-    """An expression over a flight, a curve per UAV (or per pair: the difference); only where there are rows."""
-    graph = flight.mission.graph
-    whom = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
-    for uav, other in whom:
-        t = flight.signals.column("t", uav)
-        if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
-            continue
-        values = evaluated(y, flight.signals, graph, uav)
-        who = f"UAV {uav}"
-        if other is not None:
-            theirs = evaluated(y, flight.signals, graph, other)
-            rows = min(len(values), len(theirs))
-            t, values, who = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
-        along = t if x == "t" else evaluated(x, flight.signals, graph, uav)[: len(t)]
-        rows_ = window_of(t, window) if window is not None else slice(None)
-        if len(t[rows_]):
-            yield Curve(who, uav, along[rows_], values[rows_])
 
 
 def draw(figure: Figure, flights: Sequence[Flown]) -> Any | None:
@@ -175,7 +97,7 @@ def draw(figure: Figure, flights: Sequence[Flown]) -> Any | None:
         rows: list[list[int]] = [[i] for i in wide]
         rows += [details[i : i + _IN_A_ROW] for i in range(0, len(details), _IN_A_ROW)]
         columns = int(np.lcm.reduce([len(row) for row in rows]))
-        mosaic = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
+        mosaic: Any = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
         height = _LEGEND + _ROW * len(rows)
         made, axes = plt.subplot_mosaic(mosaic, figsize=(_WIDTH, height), layout="constrained")
         for i, panel in enumerate(panels):
@@ -225,7 +147,7 @@ def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
 
 
 def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
-    last = _last(flight)
+    last = last_time(flight)
     low, high = panel.window or (0.0, last)
     for t in flight.happened:
         if low < t < min(high, last):
@@ -319,12 +241,12 @@ def save(made: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
 
 
 def _small(svg: str) -> str:
-    """Coordinates to a tenth of a point."""
-    return re.sub(r"(\d+\.\d)\d+", r"\1", svg)
+    """Coordinates of curves to a tenth of a point."""
+    return re.sub(r'\bd="[^"]+"', lambda path: re.sub(r"(\d+\.\d)\d+", r"\1", path[0]), svg)
 
 
 def _for_page(svg: str, title: str, name: str) -> str:
-    """An SVG as an element of a page: text in the page's colour, ids of its own, a title for those who cannot see it."""
+    """An SVG as an element of a page: text in the page's colour, ids of its own, a title for who cannot see it."""
     body = svg[svg.index("<svg") :].replace(_INK, "currentColor")
     body = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', body)
     body = re.sub(r'(xlink:href="|url\()#', rf"\1#{name}-", body)
@@ -342,7 +264,7 @@ def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
         return x, y
     edges = np.linspace(0, len(y), _COLUMNS + 1).astype(int)
     kept = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         part = y[a:b]
         if np.isfinite(part).any():
             low, high = a + int(np.nanargmin(part)), a + int(np.nanargmax(part))

@@ -1,9 +1,9 @@
-"""What a run showed: its claims and events, as tables, JSON and figures."""
+"""What a run showed, on the terminal: its claims and events; and its claims as JSON."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.claims import Result, evaluate
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["as_json", "claims_of", "claims_table", "draw", "show", "show_claims", "summary"]
+__all__ = ["as_json", "claims_of", "claims_table", "ids", "number", "show", "show_claims", "summary"]
 
 _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not flown[/]"}
 
@@ -36,7 +36,8 @@ def as_json(run: Run, results: list[Result]) -> str:
     return json.dumps(document, indent=2, allow_nan=False)
 
 
-def _number(value: Any) -> str:
+def number(value: Any) -> str:
+    """A measured or expected value, or several."""
     if value is None:
         return "-"
     if isinstance(value, list):
@@ -44,7 +45,7 @@ def _number(value: Any) -> str:
     return f"{value:.4g}"
 
 
-def summary(results: list[Result]) -> str:
+def summary(results: Sequence[Result]) -> str:
     """How many claims hold."""
     held = sum(result.ok is True for result in results)
     not_flown = sum(result.ok is None for result in results)
@@ -80,10 +81,10 @@ def claims_table(results: list[Result]) -> Table:
         unit = f" {claim.unit}" if claim.unit else ""
         table.add_row(
             escape(claim.name),
-            _ids(result.uavs),
+            ids(result.uavs),
             f"{start:g}" if start == end else f"{start:g} - {end:g}",
-            f"{_number(result.value)}{unit if result.value is not None else ''}",
-            _number(result.expected),
+            f"{number(result.value)}{unit if result.value is not None else ''}",
+            number(result.expected),
             escape(result.tolerance),
             _MARKS[result.ok] + (f" [dim]({escape(result.remark)})[/]" if result.remark and result.ok is False else ""),
             escape(claim.source),
@@ -91,7 +92,7 @@ def claims_table(results: list[Result]) -> Table:
     return table
 
 
-def _ids(uavs: tuple[int, ...]) -> str:
+def ids(uavs: tuple[int, ...]) -> str:
     """Ids in short: 1-6, 8."""
     runs: list[list[int]] = []
     for uav in sorted(uavs):
@@ -124,43 +125,3 @@ def show(console: Console, run: Run, results: list[Result]) -> None:
         show_claims(console, results)
     else:
         console.print(f"the scenario makes no claims for case {mission.case}")
-
-
-_FIGURES = (
-    ("altitudes", "z", "altitude, m", "all"),
-    ("altitude_tracking", "z - z_r", "altitude tracking error, m", "followers"),
-    ("speeds", "V", "airspeed, m/s", "followers"),
-    ("elevators", "elevator_command", "elevator command, rad", "followers"),
-    ("thrusts", "thrust_command", "thrust command, N", "followers"),
-)
-
-
-def draw(run: Run, folder: Path | None = None) -> list[Path]:
-    """Draw the flight against time, a figure per quantity, into the run's ``report`` folder (or ``folder``)."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    from ftcc.groundside.metrics import evaluated, names_in
-
-    mission = run.mission
-    folder = folder or run.path / "report"
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, expression, label, who in _FIGURES:
-        if not names_in(expression) <= set(run.names):
-            continue
-        figure, axes = plt.subplots(figsize=(8.0, 4.0), layout="constrained")
-        for uav in mission.graph.followers if who == "followers" else mission.uavs:
-            t = run.column("t", uav)
-            style = "--" if uav in mission.graph.leaders else "-"
-            axes.plot(t, evaluated(expression, run, mission.graph, uav), style, linewidth=1.0, label=f"UAV {uav}")
-        for t_event, _, _ in mission.events:
-            axes.axvline(t_event, color="0.8", linewidth=0.7, zorder=0)
-        axes.set(xlabel="t, s", ylabel=label)
-        axes.legend(fontsize="small", ncols=4, frameon=False)
-        written.append(folder / f"{name}.png")
-        figure.savefig(written[-1], dpi=150)
-        plt.close(figure)
-    return written

@@ -1,0 +1,97 @@
+"""What a figure shows of a flight: curves of expressions, and whether the flight has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.metrics import DERIVED, Signals, evaluated, names_in, uavs_in, window_of
+from ftcc.groundside.report.definitions import Panel
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["Curve", "Flown", "curves_of", "drawable", "has", "last_time", "uavs_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight to draw."""
+
+    label: str
+    signals: Signals
+    mission: Mission
+    happened: tuple[float, ...] = ()
+    """Times of events, s."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a panel."""
+
+    who: str
+    uav: int
+    x: Array
+    y: Array
+
+
+def drawable(panel: Panel, flight: Flown) -> bool:
+    """Whether a flight has all that a panel shows, and reaches its window."""
+    asked = [e for e in (panel.y, panel.x, panel.bound, panel.true) if e is not None]
+    return has(flight, asked, panel.pairs) and (panel.window is None or last_time(flight) > panel.window[0])
+
+
+def has(flight: Flown, expressions: Sequence[str], pairs: Sequence[tuple[int, int]] | None) -> bool:
+    """Whether a flight has the columns and the UAVs that ``expressions`` and ``pairs`` name."""
+    graph = flight.mission.graph
+    known = {"t", *flight.signals.names, *(DERIVED if graph.leaders else ())}
+    others = {uav for expression in expressions for uav in uavs_in(expression)}
+    others |= {uav for pair in pairs or () for uav in pair}
+    return all(names_in(expression) <= known for expression in expressions) and others <= set(graph.uavs)
+
+
+def last_time(flight: Flown) -> float:
+    """Last recorded time of anybody, s; -1 if nothing was recorded."""
+    times = [flight.signals.column("t", uav) for uav in flight.signals.uavs]
+    return max((float(t[-1]) for t in times if len(t)), default=-1.0)
+
+
+def uavs_of(uavs: Sequence[int] | str, mission: Mission) -> tuple[int, ...]:
+    """Ids for "followers", "leaders", "all" or a list."""
+    if isinstance(uavs, str):
+        graph = mission.graph
+        return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[uavs]
+    return tuple(uav for uav in uavs if uav in mission.uavs)
+
+
+def curves_of(
+    y: str,
+    flight: Flown,
+    uavs: Sequence[int] | str,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    window: tuple[float, float] | None = None,
+    x: str = "t",
+) -> Iterator[Curve]:
+    """An expression over a flight, a curve per UAV (or per pair: the difference); only where there are rows."""
+    graph = flight.mission.graph
+    whom = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
+    for uav, other in whom:
+        t = flight.signals.column("t", uav)
+        if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
+            continue
+        values = evaluated(y, flight.signals, graph, uav)
+        who = f"UAV {uav}"
+        if other is not None:
+            theirs = evaluated(y, flight.signals, graph, other)
+            rows = min(len(values), len(theirs))
+            t, values, who = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
+        along = t if x == "t" else evaluated(x, flight.signals, graph, uav)[: len(t)]
+        rows_ = window_of(t, window) if window is not None else slice(None)
+        if len(t[rows_]):
+            yield Curve(who, uav, along[rows_], values[rows_])

@@ -1,0 +1,168 @@
+"""The report as one page: figures, claims, what the monograph shows, events, links, versions. Needs no network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ftcc.groundside.claims import Result
+from ftcc.groundside.report.readings import Compared
+from ftcc.groundside.report.terminal import ids, number, summary
+
+if TYPE_CHECKING:
+    from ftcc.groundside.report.drawing import Drawn
+
+__all__ = ["Cell", "Head", "Page", "Section", "claims_section", "compared_section", "events_section", "plural", "write"]
+
+
+@dataclass(frozen=True)
+class Head:
+    """Heading of a column; numbers stand to the right."""
+
+    text: str
+    number: bool = False
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell, perhaps marked: "holds", "fails", "open", "warning" or "error"."""
+
+    text: str
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table with words around it, and perhaps a figure."""
+
+    anchor: str
+    title: str
+    before: Sequence[str] = ()
+    svg: str = ""
+    heads: Sequence[Head] = ()
+    rows: Sequence[Sequence[Cell]] = ()
+    after: Sequence[str] = ()
+
+
+@dataclass
+class Page:
+    """What the page is made of, in order."""
+
+    title: str
+    subtitle: str
+    facts: list[tuple[str, str]]
+    notes: list[str] = field(default_factory=list)
+    sections: list[Section] = field(default_factory=list)
+    figures: list[Drawn] = field(default_factory=list)
+    figures_note: str = ""
+    scenario: str = ""
+
+    @property
+    def contents(self) -> list[tuple[str, str]]:
+        """Anchors and titles."""
+        found = [(section.anchor, section.title) for section in self.sections]
+        if self.figures:
+            found.insert(1 if found and found[0][0] == "claims" else 0, ("figures", "Figures"))
+        if self.scenario:
+            found.append(("scenario", "Scenario as flown"))
+        return found
+
+
+def write(page: Page, path: Path) -> Path:
+    """Write a page as HTML that holds everything it shows."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    html = environment.get_template("page.html.jinja").render(**vars(page), contents=page.contents)
+    path.write_text(html, encoding="utf-8")
+    return path
+
+
+_VERDICTS = {True: Cell("holds", "holds"), False: Cell("fails", "fails"), None: Cell("not flown", "open")}
+
+
+def claims_section(results: Sequence[Result], case: str) -> Section:
+    """The claims of the scenario: what was expected, what was measured."""
+    if not results:
+        return Section("claims", "Claims", before=[f"The scenario makes no claims for case {case}."])
+    rows = []
+    for result in results:
+        claim = result.claim
+        start, end = claim.window
+        verdict = _VERDICTS[result.ok]
+        if result.remark and result.ok is False:
+            verdict = Cell(f"{verdict.text} ({result.remark})", verdict.mark)
+        rows.append(
+            [
+                Cell(claim.name),
+                Cell(ids(result.uavs)),
+                Cell(f"{start:g}" if start == end else f"{start:g} - {end:g}"),
+                Cell(f"{number(result.value)} {claim.unit}" if result.value is not None else "-"),
+                Cell(number(result.expected)),
+                Cell(result.tolerance),
+                verdict,
+                Cell(claim.source),
+            ]
+        )
+    heads = [Head("claim"), Head("UAV"), Head("window, s"), Head("measured", True), Head("expected", True)]
+    heads += [Head("tolerance"), Head("verdict"), Head("source")]
+    return Section("claims", "Claims", before=[summary(results) + "."], heads=heads, rows=rows)
+
+
+def compared_section(
+    compared: Iterable[Compared], source: str, form: str, variants: Sequence[str], notes: Sequence[str]
+) -> Section:
+    """What the monograph shows against what the run shows, differences included."""
+    rows = []
+    agreed = differing = 0
+    for one in compared:
+        verdict = {True: Cell("agrees", "holds"), False: Cell("differs", "fails"), None: Cell("-", "open")}[one.agrees]
+        agreed += one.agrees is True
+        differing += one.agrees is False
+        unit = "" if one.unit in ("", "-") else f" {one.unit}"
+        cells = [Cell(one.figure), Cell(one.what), Cell(one.monograph + unit), Cell(one.measured + unit)]
+        rows.append([*cells, verdict, Cell(one.difference)])
+    before = [
+        f"What {source} shows in its figures and says of them, against this run: {agreed} of {len(rows)} agree, "
+        f"{differing} differ. A value that is read off a plot agrees within a fifth of its range."
+    ]
+    if form != "monograph" or variants:
+        what = f"form {form}" + (f", variant {', '.join(variants)}" if variants else "")
+        before.append(
+            f"This run flew {what}; the monograph simulates the printed law in continuous time with ideal exchange "
+            "(form monograph), so that differences are to be expected."
+        )
+    heads = [
+        Head("figure"),
+        Head("quantity"),
+        Head("monograph", True),
+        Head("this run", True),
+        Head(""),
+        Head("remark"),
+    ]
+    return Section("monograph", "Compared with the monograph", before, heads=heads, rows=rows, after=notes)
+
+
+def events_section(events: Sequence[dict[str, Any]], svg: str) -> Section:
+    """What happened, as a time line and a list."""
+    if not events:
+        return Section("events", "Events", before=["None were recorded."])
+    rows = []
+    for event in events:
+        severity = str(event.get("severity", "info"))
+        text = str(event["text"])
+        uav = event.get("uav")
+        mark = "" if severity == "info" else severity
+        rows.append([Cell(f"{float(event['t']):.2f}"), Cell("" if uav is None else str(uav)), Cell(text, mark)])
+    heads = [Head("t, s", True), Head("UAV"), Head("event")]
+    return Section("events", "Events", svg=svg, heads=heads, rows=rows)
+
+
+def plural(count: int, what: str) -> str:
+    """1 UAV, 2 UAVs."""
+    return f"{count} {what}" + ("" if count == 1 else "s")

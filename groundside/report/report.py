@@ -1,0 +1,151 @@
+"""Writes a run's report: ``report/index.html`` and its figures, from whatever of the run there is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ftcc.groundside.claims import Result, evaluate
+from ftcc.groundside.report.curves import Flown
+from ftcc.groundside.report.definitions import Sheet, sheet_of
+from ftcc.groundside.report.drawing import Drawn, draw, draw_timeline, save
+from ftcc.groundside.report.page import Page, Section, claims_section, compared_section, events_section, plural, write
+from ftcc.groundside.report.readings import compare
+from ftcc.groundside.run import Run, RunError
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["draw_figures", "write_report"]
+
+
+class _Nothing:
+    """A recording without a row."""
+
+    uavs: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+
+    def column(self, name: str, uav: int) -> Any:
+        import numpy as np
+
+        return np.empty(0)
+
+
+def write_report(run: Run, folder: Path | None = None) -> Path:
+    """Write the report of a run, complete or not, and return its page.
+
+    A run that recorded nothing has a report that says so: its scenario, its events, its claims as not flown.
+    """
+    mission = run.mission
+    folder = folder or run.path / "report"
+    notes = []
+    try:
+        signals: Any = run
+        end = run.end
+    except RunError as error:
+        notes.append(f"{error}. What follows is what the scenario says and what was logged.")
+        signals, end = _Nothing(), 0.0
+    events = run.events
+    results = evaluate(signals, mission.claims, mission.case, mission.graph)
+    happened = tuple(sorted({round(float(event["t"]), 3) for event in events}))
+    flown = Flown(mission.case, signals, mission, happened)
+    sheet = sheet_of(mission)
+    notes += _unfinished(run, mission, end)
+    page = Page(
+        title=mission.title,
+        subtitle=_subtitle(run, mission),
+        facts=_facts(run, mission, end, results),
+        notes=notes,
+        figures=draw_figures(sheet, [flown], folder),
+        figures_note=_figures_note(sheet, mission),
+        scenario=mission.toml,
+    )
+    timeline = draw_timeline(events, mission, end)
+    svg = save(timeline, "timeline", "Events by time", "", folder).svg if timeline is not None else ""
+    page.sections.append(claims_section(results, mission.case))
+    if sheet.source and mission.name in sheet.scenarios:
+        compared = compare(sheet, flown)
+        page.sections.append(compared_section(compared, sheet.source, mission.form, mission.variants, sheet.notes))
+    page.sections.append(events_section(events, svg))
+    page.sections += _health(run, mission)
+    return write(page, folder / "index.html")
+
+
+def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path) -> list[Drawn]:
+    """Draw and write all figures of a sheet of which the flights have something."""
+    drawn = []
+    for figure in sheet.figures:
+        made = draw(figure, flights)
+        if made is not None:
+            number = f"Figure {figure.number}" if figure.number else ""
+            drawn.append(save(made, figure.name, figure.title, number, folder))
+    return drawn
+
+
+def _subtitle(run: Run, mission: Mission) -> str:
+    variants = f", variant {', '.join(mission.variants)}" if mission.variants else ""
+    flown = f"Scenario {mission.name}, form {mission.form}{variants}"
+    return f"{mission.scheme.title}. {flown}; run {run.path.resolve().name}."
+
+
+def _facts(run: Run, mission: Mission, end: float, results: Sequence[Result]) -> list[tuple[str, str]]:
+    held = sum(result.ok is True for result in results)
+    timing = mission.timing
+    facts = [
+        ("claims that hold", f"{held} of {len(results)}" if results else "none made"),
+        ("flown", f"{end:g} of {timing.duration:g} s"),
+        (
+            "swarm",
+            f"{plural(len(mission.graph.followers), 'follower')}, {plural(len(mission.graph.leaders), 'leader')}",
+        ),
+        ("control", f"{1e6 / timing.period_us:g} Hz"),
+        ("exchange", f"{1e6 / timing.exchange_us:g} Hz" if mission.wire else "ideal"),
+        ("seed", str(timing.seed)),
+        ("late ticks", _late(run, mission)),
+    ]
+    flown = run.scenario.plan.flown
+    if flown is not None and flown.settings:
+        facts.append(("settings", ", ".join(flown.settings)))
+    return facts
+
+
+def _late(run: Run, mission: Mission) -> str:
+    for event in reversed(run.events):
+        if "late" in event:
+            return f"{event['late']} of {event['ticks']}"
+    return "not known" if _has_processes(run) else "none (one process)"
+
+
+def _has_processes(run: Run) -> bool:
+    return (run.path / "parts").is_dir() or (run.path / "logs").is_dir()
+
+
+def _unfinished(run: Run, mission: Mission, end: float) -> list[str]:
+    """What a reader must know before trusting the numbers."""
+    notes = [f"UAV {uav}: {text}" for uav, text in run.lost.items()]
+    over = any("flight over" in str(event["text"]) for event in run.events)
+    step = mission.timing.record_every * mission.timing.period
+    if end < mission.timing.duration - 1.5 * step:
+        how = "" if over or not _has_processes(run) else " and was not ended in order: the last seconds may be missing"
+        notes.append(f"The flight ended at {end:g} s of {mission.timing.duration:g} s{how}.")
+    return notes
+
+
+def _figures_note(sheet: Sheet, mission: Mission) -> str:
+    if sheet.source and mission.name in sheet.scenarios:
+        return f"As the figures of {sheet.source}, with their quantities and axes. Gray lines: events."
+    if sheet.source:
+        return f"The quantities of {sheet.source}'s figures, for a scenario of one's own. Gray lines: events."
+    return "What the scheme declares: motion, errors with their bounds, commands with their limits. Gray lines: events."
+
+
+def _health(run: Run, mission: Mission) -> list[Section]:
+    """Links and versions."""
+    from ftcc.groundside.report.page import Cell, Head
+
+    flown = run.scenario.plan.flown
+    if flown is None or not flown.versions:
+        return []
+    rows = [[Cell(name), Cell(version)] for name, version in sorted(flown.versions.items())]
+    return [Section("versions", "Versions", heads=[Head("program"), Head("version")], rows=rows)]
