@@ -21,7 +21,7 @@ from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.link.channel import Inbox, admit
+from ftcc.link.channel import LINK_REPORT, Inbox, admit, report_link
 from ftcc.link.gate import Ended, Gate, Ready, Said
 from ftcc.link.mavlink import (
     AUTOPILOT,
@@ -35,7 +35,7 @@ from ftcc.link.mavlink import (
 )
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.record import Record
-from ftcc.link.recording import Column, PartWriter
+from ftcc.link.recording import LINK_COLUMNS, Column, PartWriter, part_path
 
 __all__ = ["Crew", "columns", "load_compiled", "run"]
 
@@ -74,6 +74,7 @@ def load_compiled(autopilots: Autopilots, inbox: Inbox, events: LinkEvents, law:
     law.hear_and_control(autopilots, inbox, nobody, controls, nobody, 0, 1)
     set_links(events, inbox, -1)
     admit(inbox, 0, 0, -1, 0, True, autopilots.shared[0], 0, 0, 0)
+    report_link(inbox, 0, 0, np.zeros(len(LINK_REPORT)))
 
 
 def _those(mask: np.ndarray) -> list[int]:
@@ -111,10 +112,16 @@ class Crew:
             for spec, port in zip(specs, ports, strict=True)
         ]
         self.parts = {
-            i: PartWriter(setting.folder / "parts" / f"{spec.uav}-autopilot.arrows", columns(spec.scheme))
+            i: PartWriter(part_path(setting.folder, spec.uav, "autopilot"), columns(spec.scheme))
             for i, spec in enumerate(specs)
             if spec.role == "follower"
         }
+        self.link_parts = {
+            i: PartWriter(part_path(setting.folder, spec.uav, "links"), LINK_COLUMNS)
+            for i, spec in enumerate(specs)
+            if spec.neighbours
+        }
+        self.link_report = np.zeros(len(LINK_REPORT))
         self.neighbourhood = Neighbourhood(specs, setting, gate)
         self.flushing = Telemetry(self.timing)
         self.stall = Stall()
@@ -162,7 +169,7 @@ class Crew:
             self.fly_in_real_time()
         for i in range(len(self.specs)):
             self.end(i)
-        for part in self.parts.values():
+        for part in (*self.parts.values(), *self.link_parts.values()):
             part.close()
         for spec, link in zip(self.specs, self.ground, strict=True):
             dropped = {reason: count for reason, count in link.dropped().items() if count}
@@ -297,10 +304,19 @@ class Crew:
                 continue
             if i in self.parts and tick % self.timing.record_every == 0:
                 self.parts[i].row((now / 1e6, self.specs[i].uav, *self.autopilots.signals[i]))
+            if i in self.link_parts and tick % self.timing.report_every == 0:
+                self.report_links(i, now / 1e6)
             self.ground[i].report(now)
         if self.flushing.due(tick):
-            for part in self.parts.values():
+            for part in (*self.parts.values(), *self.link_parts.values()):
                 part.flush_if_due()
+
+    def report_links(self, i: int, t: float) -> None:
+        """A row on each in-edge of autopilot ``i`` at ``t`` (s)."""
+        spec = self.specs[i]
+        for edge, neighbour in enumerate(spec.neighbours):
+            report_link(self.inbox, i, edge, self.link_report)
+            self.link_parts[i].row((t, spec.uav, neighbour.uav, *self.link_report))
 
     # What surrounds the tick.
 

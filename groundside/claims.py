@@ -17,11 +17,7 @@ from ftcc.link.graph import Graph
 __all__ = ["Result", "Tolerance", "by_case", "check_claims", "evaluate", "failed", "tolerance_of", "uavs_of"]
 
 _TOLERANCE = re.compile(
-<<<<<<< HEAD
     r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[-+0-9.eE]+))?\s*$"
-=======
-    r"^\s*(?P<bound>[<>])?\s*(?P<size>[-+0-9.eE]+)\s*(?P<unit>%|x)?(?:\s+or\s+(?P<least>[0-9.eE+-]+))?\s*$"
->>>>>>> 3b52639 (Report as a page: figures of the monograph as data, comparison with it, runs compared)
 )
 
 

@@ -173,16 +173,24 @@ def report(
     """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import as_json, claims_of, show
-    from ftcc.groundside.run import Run, RunError
+    from ftcc.groundside.report.report import write_report
+    from ftcc.groundside.run import NothingRecordedError, Run, RunError
 
     recorded = Run(run)
-    results = claims_of(recorded)
-    out = terminal()
+    written = terminal(stderr=True)
+    try:
+        results = claims_of(recorded)
+    except NothingRecordedError as error:
+        if json or csv or mat:
+            raise
+        warn(str(error))
+        if page:
+            written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+        raise typer.Exit(1) from None
     if json:
         print(as_json(recorded, results))
     else:
-        show(out, recorded, results)
-    written = terminal(stderr=True)
+        show(terminal(), recorded, results)
     for option, file, export in (("--csv", csv, recorded.export_csv), ("--mat", mat, recorded.export_mat)):
         if file is not None:
             try:
@@ -191,8 +199,6 @@ def report(
                 raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
             written.print(f"wrote {file}", highlight=False, soft_wrap=True)
     if page and not json:
-        from ftcc.groundside.report.report import write_report
-
         written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
     if failed(results):
         raise typer.Exit(1)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ftcc.airside.autopilots import lead, sense
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
-from ftcc.link.channel import admit, hear
+from ftcc.link.channel import admit, hear, report_link
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import DIVERGED, X, Z
@@ -35,6 +35,7 @@ _actuate = cycle.actuate
 _truth = cycle.truth
 _measure = cycle.measure
 _advance = cycle.advance
+_conditions = cycle.conditions
 
 HISTORY = 64
 """Records kept of each sender."""
@@ -64,8 +65,12 @@ class Recording(NamedTuple):
     """(n, k, 4): in force."""
     acting: NDArray[np.float64]
     """(n, k, 4)."""
+    conditions: NDArray[np.float64]
+    """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
     signals: NDArray[np.float64]
     """(n, k, s)."""
+    links: NDArray[np.float64]
+    """(m, k, e, 5): of each in-edge, see ``link.channel.LINK_REPORT``; nan where there is none."""
     lost: NDArray[np.int64]
     """(k,): why a UAV was lost, 0 = it was not."""
     lost_us: NDArray[np.int64]
@@ -137,6 +142,7 @@ def fly(
     latency,
     step,
     every,
+    report_every,
     seed,
     wire,
     first,
@@ -144,7 +150,8 @@ def fly(
 ):
     """Fly the ticks first..last-1.
 
-    Periods are in us, ``every`` is the number of ticks between recorded rows. With ``wire``, states and commands pass
+    Periods are in us, ``every`` is the number of ticks between recorded rows, ``report_every`` between those on
+    the links. With ``wire``, states and commands pass
     through the messages' float32 and a command acts one sample after its measurement, as between processes; without,
     the exchange is ideal: all share, then all step, and the command acts at once.
     """
@@ -207,7 +214,11 @@ def fly(
                 copy(true[i], recording.truth[row, i])
                 copy(fleet.command[i], recording.command[row, i])
                 copy(fleet.acting[i], recording.acting[row, i])
+                _conditions(fleet, i, now / 1e6, recording.conditions[row, i])
                 copy(autopilots.signals[i], recording.signals[row, i])
+            if n % report_every == 0 and recording.lost[i] == 0:
+                for edge in range(inbox.degree[i]):
+                    report_link(inbox, i, edge, recording.links[n // report_every, i, edge])
             why = _advance(fleet, i, now, period, step)
             if why > 0 and recording.lost[i] == 0:
                 recording.lost[i] = why

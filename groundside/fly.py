@@ -172,6 +172,7 @@ def fly(
         f"flight over: {swarm.outcome.late} of {swarm.outcome.ticks} ticks late",
         late=swarm.outcome.late,
         ticks=swarm.outcome.ticks,
+        late_of={str(uav): state.late for uav, state in station.snapshot().uavs.items()},
     )
     log.close()
     return swarm.outcome

@@ -330,8 +330,12 @@ def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, st
     return tuple(sorted((event for event in events if event[0] <= ends), key=lambda e: (e[0], e[1] or 0, e[2])))
 
 
+_VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "eclipse-zenoh")
+"""What the numbers of a flight may depend on."""
+
+
 def _as_flown(scenario: Scenario) -> str:
-    versions = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "scipy", "pydantic")}
+    versions = {name: importlib.metadata.version(name) for name in _VERSIONED}
     versions["python"] = platform.python_version()
     document = {key: value for key, value in scenario.document.items() if key != "flown"}
     document["seed"] = scenario.plan.seed

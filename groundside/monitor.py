@@ -8,11 +8,11 @@ import time
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ftcc.airside.ground import LINK_FIELDS
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
-from ftcc.link.actuators import in_slots
 from ftcc.link.mavlink import STATION, Endpoint
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
@@ -53,7 +53,7 @@ class Monitor:
         self._uavs = {uav: _Heard() for uav in uavs}
         self._signals = signals
         self._truth = truth_array(plant)
-        self._actuators = in_slots(find(plant).ACTUATORS)
+        self._plant = find(plant)
         self._log = log.open("ab") if log else None
         self._events: list[Event] = []
         self.t = 0.0
@@ -113,13 +113,14 @@ class Monitor:
 
     def snapshot(self) -> Snapshot:
         """The swarm as heard so far, and what happened since the last call."""
-        uavs = {uav: _state(heard, self._actuators) for uav, heard in self._uavs.items() if heard.truth}
+        uavs = {uav: _state(heard, self._plant) for uav, heard in self._uavs.items() if heard.truth}
         events, self._events = tuple(self._events), []
         return Snapshot(self.t, uavs, events)
 
 
-def _state(heard: _Heard, actuators: Sequence[str]) -> UavState:
+def _state(heard: _Heard, plant: ModuleType) -> UavState:
     truth = heard.truth
+    actuators = plant.ACTUATORS
     return UavState(
         t=heard.t,
         truth={name: truth[name] for name in TRUTH},
@@ -127,6 +128,7 @@ def _state(heard: _Heard, actuators: Sequence[str]) -> UavState:
         acting={name: truth[name] for name in actuators},
         effectiveness={name: truth[f"{name}_effectiveness"] for name in actuators},
         bias={name: truth[f"{name}_bias"] for name in actuators},
+        disturbances={name: truth[name] for name, _ in plant.DISTURBANCES},
         signals=heard.signals,
         links=heard.links,
         late=int(truth["late"]),

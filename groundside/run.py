@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.errors import UserError
-from ftcc.link.recording import Column, arrow_schema, read_events, read_part
+from ftcc.link.recording import LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 from ftcc.sim.plant import TRUTH
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
     from ftcc.groundside.scenario import Scenario
 
-__all__ = ["LEADING", "Run", "RunError", "new_folder", "write_signals"]
+__all__ = ["LEADING", "NothingRecordedError", "Run", "RunError", "new_folder", "write_table"]
 
 _SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
@@ -77,8 +77,8 @@ def _ordered(columns: Sequence[Column]) -> list[Column]:
     return first + rest
 
 
-def write_signals(path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> None:
-    """Write a recording: a Parquet file that appears when it is complete.
+def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> None:
+    """Write a table: a Parquet file that appears when it is complete.
 
     Parameters
     ----------
@@ -95,6 +95,10 @@ def write_signals(path: Path, columns: Sequence[Column], values: Mapping[str, ND
     unfinished = path.with_suffix(".unfinished")
     pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
     unfinished.replace(path)
+
+
+class NothingRecordedError(RunError):
+    """A run that ended before anything was recorded."""
 
 
 class Run:
@@ -157,9 +161,7 @@ class Run:
     @functools.cached_property
     def signals(self) -> Any:
         """The recording as a ``pyarrow.Table``: a row per recorded tick and UAV; units in the columns' metadata."""
-        import pyarrow.parquet as pq
-
-        return pq.read_table(self.file)
+        return self._table(None)
 
     @functools.cached_property
     def columns(self) -> dict[str, Column]:
@@ -167,7 +169,7 @@ class Run:
         import pyarrow.parquet as pq
 
         found = {}
-        for field in pq.read_schema(self.file):
+        for field in self._readable(lambda: pq.read_schema(self.file)):
             notes = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
             found[field.name] = Column(field.name, notes.get("unit", ""), notes.get("meaning", ""))
         return found
@@ -182,11 +184,27 @@ class Run:
         return order, {int(uav): slice(int(a), int(b)) for uav, a, b in zip(ids, starts, ends, strict=True)}
 
     def _read(self, name: str) -> NDArray[Any]:
-        import pyarrow.parquet as pq
-
         if name not in self.columns:
             raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
-        return pq.read_table(self.file, columns=[name]).column(0).to_numpy()  # type: ignore[no-any-return]
+        return self._table([name]).column(0).to_numpy()  # type: ignore[no-any-return]
+
+    def _table(self, names: list[str] | None) -> Any:
+        """Columns of the recording, or all."""
+        import pyarrow.parquet as pq
+
+        return self._readable(lambda: pq.read_table(self.file, columns=names))
+
+    def _readable(self, read: Callable[[], Any]) -> Any:
+        """What ``read`` gives, or a message that says which file is damaged and what may help."""
+        import pyarrow as pa
+
+        try:
+            return read()
+        except (pa.ArrowInvalid, pa.ArrowException, OSError) as error:
+            what = str(error).splitlines()[0]
+            raise RunError(
+                f"{self.path / 'signals.parquet'}: cannot be read ({what}); a run with parts/ is merged anew without it"
+            ) from None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -215,16 +233,16 @@ class Run:
         Raises
         ------
         RunError
-            If no process wrote anything.
+            If no process wrote anything: `NothingRecordedError`.
         """
         tables: dict[int, list[Any]] = {}
         for path in sorted((self.path / "parts").glob("*.arrows")):
-            table = read_part(path)
+            table = read_part(path) if not path.stem.endswith("-links") else None
             if table is not None:
                 # The vehicle's part first: its columns lead.
                 tables.setdefault(int(path.name.split("-")[0]), []).append((path.stem.endswith("autopilot"), table))
         if not any(table.num_rows for pairs in tables.values() for _, table in pairs):
-            raise RunError(f"{self.path}: nothing was recorded")
+            raise NothingRecordedError(f"{self.path}: nothing was recorded")
         parts = {uav: [table for _, table in sorted(pairs, key=lambda p: p[0])] for uav, pairs in tables.items()}
         columns = [
             Column(f.name, f.metadata[b"unit"].decode(), f.metadata[b"meaning"].decode())
@@ -238,9 +256,25 @@ class Run:
         values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
         order = np.lexsort((values["uav"], values["t"]))
         target = self.path / "signals.parquet"
-        write_signals(target, columns, {name: column[order] for name, column in values.items()})
+        write_table(target, columns, {name: column[order] for name, column in values.items()})
         self.__dict__.pop("signals", None)
         return target
+
+    @functools.cached_property
+    def links(self) -> dict[str, NDArray[Any]]:
+        """What the UAVs told of their in-edges, a row per edge and second: the columns of ``LINK_COLUMNS``."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path = self.path / "links.parquet"
+        if path.is_file():
+            table = pq.read_table(path)
+        else:
+            read = (read_part(part) for part in sorted((self.path / "parts").glob("*-links.arrows")))
+            tables = [table for table in read if table is not None]
+            table = pa.concat_tables(tables) if tables else arrow_schema(LINK_COLUMNS).empty_table()
+            table = table.sort_by([("t", "ascending"), ("uav", "ascending"), ("sender", "ascending")])
+        return {name: table.column(name).to_numpy() for name in table.column_names}
 
     def export_csv(self, file: Path) -> None:
         """Write the recording as comma-separated values, names in the first line."""

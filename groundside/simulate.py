@@ -17,14 +17,15 @@ from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.autopilots import tick_of
 from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
-from ftcc.groundside.run import Run, write_signals
+from ftcc.groundside.run import Run, write_table
 from ftcc.link.actuators import ACTUATORS, in_slots
+from ftcc.link.channel import LINK_REPORT
 from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.happenings import drained
-from ftcc.link.recording import EventLog
+from ftcc.link.recording import LINK_COLUMNS, EventLog
 from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
-from ftcc.sim.plants import cycle_of, find
+from ftcc.sim.plants import conditions_of, cycle_of, find
 from ftcc.sim.spec import build as build_vehicles
 
 __all__ = ["Flight", "PlainPython", "fly", "loop_of", "record", "simulate"]
@@ -50,8 +51,12 @@ class Flight:
     """(n, k, 4): in force, by the actuators' slots."""
     acting: NDArray[np.float64]
     """(n, k, 4): what acts on the airframe."""
+    conditions: NDArray[np.float64]
+    """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
     signals: NDArray[np.float64]
     """(n, k, s): in the order of the scheme's ``SIGNALS``."""
+    links: NDArray[np.float64]
+    """(m, k, e, 5): a row per report and in-edge, in the order of the neighbours; see ``link.channel.LINK_REPORT``."""
     t: NDArray[np.float64]
     """(n,): s."""
     lost: dict[int, tuple[float, str]]
@@ -75,6 +80,7 @@ class Flight:
         actuators = in_slots(find(self.mission.plant).ACTUATORS)
         places |= {f"{name}_command": (self.command, n) for n, name in enumerate(actuators)}
         places |= {name: (self.acting, n) for n, name in enumerate(actuators)}
+        places |= {name: (self.conditions, n) for n, (name, _) in enumerate(conditions_of(self.mission.plant))}
         if self.mission.obstacles:
             places["clearance"] = (self.clearance, 0)
         return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
@@ -95,6 +101,28 @@ class Flight:
             return self.t[:rows]
         values, n = self._places[name]
         return values[:rows, i, n]
+
+    def link_table(self) -> dict[str, NDArray[Any]]:
+        """A row per report and in-edge, by time, then receiver; the columns of ``link.recording.LINK_COLUMNS``."""
+        timing = self.mission.timing
+        times = np.arange(len(self.links)) * (timing.report_every * timing.period_us / 1e6)
+        edges = [
+            (i, edge, spec.uav, neighbour.uav)
+            for i, spec in sorted(enumerate(self.mission.autopilots), key=lambda pair: pair[1].uav)
+            for edge, neighbour in enumerate(spec.neighbours)
+        ]
+        values = [self.links[:, i, edge] for i, edge, _, _ in edges]
+        rows = (
+            np.stack(values, axis=1).reshape(len(times) * len(edges), -1) if values else np.empty((0, len(LINK_REPORT)))
+        )
+        table: dict[str, NDArray[Any]] = {
+            "t": np.repeat(times, len(edges)),
+            "uav": np.tile(np.array([edge[2] for edge in edges], np.int32), len(times)),
+            "sender": np.tile(np.array([edge[3] for edge in edges], np.int32), len(times)),
+        }
+        table |= {name: rows[:, n] for n, name in enumerate(LINK_REPORT)}
+        told = np.isfinite(table["sent"])
+        return {name: column[told] for name, column in table.items()}
 
     def table(self) -> dict[str, NDArray[Any]]:
         """All columns, a row per recorded tick and UAV, by time, then UAV."""
@@ -132,9 +160,14 @@ def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
         radio_on=np.zeros((k, loop.HISTORY), np.int64),
         values=np.zeros((k, loop.HISTORY, mission.scheme.shared_width)),
     )
-    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), len(mission.scheme.signals))
+    conditions = len(conditions_of(mission.plant))
+    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, len(mission.scheme.signals))
+    reports = mission.timing.ticks // mission.timing.report_every + 1
     recording = loop.Recording(
-        *(np.full((rows, k, width), np.nan) for width in widths), np.zeros(k, np.int64), np.zeros(k, np.int64)
+        *(np.full((rows, k, width), np.nan) for width in widths),
+        links=np.full((reports, *inbox.valid.shape, len(LINK_REPORT)), np.nan),
+        lost=np.zeros(k, np.int64),
+        lost_us=np.zeros(k, np.int64),
     )
     scratch = loop.Scratch(np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(ACTUATORS)))
     events = link_events(mission.autopilots)
@@ -164,6 +197,7 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
         timing.latency_us,
         timing.step_us,
         timing.record_every,
+        timing.report_every,
         timing.seed,
         mission.wire,
     )
@@ -192,7 +226,9 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
         truth=recording.truth[:rows],
         command=recording.command[:rows],
         acting=recording.acting[:rows],
+        conditions=recording.conditions[:rows],
         signals=recording.signals[:rows],
+        links=recording.links[: (flown - 1) // timing.report_every + 1 if flown else 0],
         t=np.arange(rows) * timing.record_every * timing.period_us / 1e6,
         lost={
             uav: (float(recording.lost_us[i] / 1e6), LOST[int(recording.lost[i])])
@@ -241,5 +277,6 @@ def record(flight: Flight, folder: Path) -> Run:
         events.write(last, "interrupted", severity="warning")
     events.close()
     columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
-    write_signals(folder / "signals.parquet", columns, flight.table())
+    write_table(folder / "signals.parquet", columns, flight.table())
+    write_table(folder / "links.parquet", LINK_COLUMNS, flight.link_table())
     return Run(folder)

@@ -55,6 +55,8 @@ class UavState:
     """The scheme's ``SIGNALS``; empty for a leader."""
     links: Mapping[int, LinkState]
     """In-edges by sender."""
+    disturbances: Mapping[str, float] = field(default_factory=dict)
+    """True ones, by the names of the plant."""
     late: int = 0
     """Ticks in which the command came too late."""
 

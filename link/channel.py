@@ -8,6 +8,7 @@ single-process simulation run the very same code.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +17,15 @@ from numpy.typing import NDArray
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import CHANNEL, philox, uniform
 
-__all__ = ["SLOTS", "Channel", "Edge", "Inbox", "admit", "hear", "new_inbox"]
+__all__ = ["LINK_REPORT", "SLOTS", "Channel", "Edge", "Inbox", "admit", "hear", "new_inbox", "report_link"]
 
 SLOTS = 32
 """Records that can be under way on one edge at a time."""
+
+
+LINK_REPORT = ("sent", "received", "lost", "age", "oldest")
+"""What `report_link` tells of an in-edge: records that the sender sent, that came and that the channel lost since the
+start; mean and greatest age, s, since the last report (nan where nothing was heard)."""
 
 
 class Channel(NamedTuple):
@@ -81,6 +87,8 @@ class Inbox(NamedTuple):
     """(k, n): its age at the present tick, s."""
     valid: NDArray[np.float64]
     """(k, n): 1 once the neighbour has been heard."""
+    ages: NDArray[np.float64]
+    """(k, n, 3): sum, number and greatest of the ages since the last report."""
 
 
 def new_inbox(senders: list[list[int]], receivers: list[int], values: int, channel: Channel) -> Inbox:
@@ -101,6 +109,7 @@ def new_inbox(senders: list[list[int]], receivers: list[int], values: int, chann
         values=np.zeros((k, n, values)),
         age=np.zeros((k, n)),
         valid=np.zeros((k, n)),
+        ages=np.zeros((k, n, 3)),
     )
 
 
@@ -173,4 +182,21 @@ def hear(inbox, i, now):
                     _take(inbox, i, edge, stamp, inbox.slot_values[i, edge, slot])
         if inbox.stamp[i, edge] >= 0:
             inbox.valid[i, edge] = 1.0
-            inbox.age[i, edge] = max(0, now - inbox.stamp[i, edge]) / 1e6
+            age = max(0, now - inbox.stamp[i, edge]) / 1e6
+            inbox.age[i, edge] = age
+            inbox.ages[i, edge, 0] += age
+            inbox.ages[i, edge, 1] += 1.0
+            inbox.ages[i, edge, 2] = max(inbox.ages[i, edge, 2], age)
+
+
+@compiled
+def report_link(inbox, i, edge, out):
+    """Write what `LINK_REPORT` names of an in-edge of UAV ``i`` into ``out``, and begin a new report."""
+    ages = inbox.ages[i, edge]
+    out[0] = float(inbox.edges[i, edge, 3])
+    out[1] = float(inbox.edges[i, edge, 4])
+    out[2] = float(inbox.edges[i, edge, 5])
+    out[3] = ages[0] / ages[1] if ages[1] > 0.0 else math.nan
+    out[4] = ages[2] if ages[1] > 0.0 else math.nan
+    for n in range(3):
+        ages[n] = 0.0

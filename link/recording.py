@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 __all__ = [
+    "LINK_COLUMNS",
     "SCHEMA_VERSION",
     "Column",
     "EventLog",
@@ -30,7 +31,7 @@ SCHEMA_VERSION = 1
 _ROWS = 500
 """Rows in a record batch: 5 s at 100 Hz is what a killed process loses at most."""
 
-_INTEGERS = ("uav",)
+_INTEGERS = ("uav", "sender")
 
 
 class Column(NamedTuple):
@@ -41,8 +42,21 @@ class Column(NamedTuple):
     meaning: str = ""
 
 
+LINK_COLUMNS = (
+    Column("t", "s", "simulated time"),
+    Column("uav", "-", "id of the receiver"),
+    Column("sender", "-", "id of the sender"),
+    Column("sent", "-", "records that the sender sent so far"),
+    Column("received", "-", "records that came so far"),
+    Column("lost", "-", "records that the channel lost so far"),
+    Column("age", "s", "mean age of what was heard last, since the row before"),
+    Column("oldest", "s", "greatest age of what was heard last, since the row before"),
+)
+"""Of the links' part of the recording: a row per in-edge and second."""
+
+
 def part_path(folder: Path, uav: int, role: str) -> Path:
-    """Where the process that plays ``role`` ("vehicle" or "autopilot") for a UAV writes."""
+    """Where a UAV's ``role`` ("vehicle", "autopilot" or "links") is written."""
     return Path(folder) / "parts" / f"{uav}-{role}.arrows"
 
 

@@ -36,6 +36,11 @@ class Timing:
         return self.exchange_us // self.period_us
 
     @property
+    def report_every(self) -> int:
+        """Ticks between recorded rows on the links: a second, as nearly as the period allows."""
+        return max(1, round(1e6 / self.period_us))
+
+    @property
     def duration(self) -> float:
         """s."""
         return self.ticks * self.period_us / 1e6

@@ -12,11 +12,11 @@ from typing import Any
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, moved
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, hold_speed, stroke
+from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 
-__all__ = ["actuate", "advance", "fly_period", "measure", "report_state", "truth"]
+__all__ = ["actuate", "advance", "conditions", "fly_period", "measure", "report_state", "truth"]
 
 if "plant" not in globals():
     raise ImportError("ftcc.sim.cycle is a template: use ftcc.sim.plants.cycle_of(plant)")
@@ -124,6 +124,16 @@ def truth(fleet, i, time, out):
     else:
         _truth(fields(_State, fleet.state[i]), fleet.offset[i], out)
         _complete(out)
+
+
+@compiled
+def conditions(fleet, i, time, out):
+    """Write what is wrong with vehicle ``i`` at ``time`` (s) into ``out``, in the order of `plants.conditions_of`."""
+    count = len(_SLOTS)
+    for n, slot in enumerate(_SLOTS):
+        out[n], out[count + n] = fault(fleet, i, slot, time)
+    for channel in range(_CHANNELS):
+        out[2 * count + channel] = disturbance(fleet, i, channel, time)
 
 
 @compiled

@@ -28,7 +28,7 @@ __all__ = [
     "Guards",
     "actuate",
     "disturbance",
-    "effects",
+    "fault",
     "hold_speed",
     "stroke",
 ]
@@ -167,7 +167,7 @@ def _onset(since: float, rate: float) -> float:
 
 
 @compiled
-def _fault(fleet, i, actuator, time):
+def fault(fleet, i, actuator, time):
     """Effectiveness and bias of an actuator: those of its latest fault."""
     effectiveness = 1.0
     bias = 0.0
@@ -214,7 +214,7 @@ def _immediate(fleet, i, actuator):
 def actuate(fleet, i, time):
     """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force."""
     for actuator in range(4):
-        effectiveness, bias = _fault(fleet, i, actuator, time)
+        effectiveness, bias = fault(fleet, i, actuator, time)
         if _immediate(fleet, i, actuator):
             fleet.position[i, actuator] = _saturated(fleet, i, actuator)
         elif fleet.fault_before_lag[i] > 0.0:
@@ -242,7 +242,7 @@ def stroke(fleet, i, actuator, time, step):
 
     A fault is taken at ``time`` (s), the middle of the step.
     """
-    effectiveness, bias = _fault(fleet, i, actuator, time)
+    effectiveness, bias = fault(fleet, i, actuator, time)
     target = _saturated(fleet, i, actuator)
     before = fleet.position[i, actuator]
     if _immediate(fleet, i, actuator):
@@ -257,9 +257,3 @@ def stroke(fleet, i, actuator, time, step):
     after = _moved(before, target, lag, rate, step)
     fleet.position[i, actuator] = after
     return effectiveness * before + bias, effectiveness * middle + bias, effectiveness * after + bias
-
-
-def effects(fleet: Fleet, i: int, time: float) -> list[float]:
-    """Effectiveness (4) and bias (4) of the actuators of vehicle ``i`` at ``time`` (s)."""
-    pairs = [_fault(fleet, i, actuator, time) for actuator in range(4)]
-    return [pair[0] for pair in pairs] + [pair[1] for pair in pairs]

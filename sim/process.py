@@ -31,8 +31,8 @@ from ftcc.link.mavlink import (
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
 from ftcc.sim.obstacles import clearance, entered_text
-from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z, effects
-from ftcc.sim.plants import cycle_of, find
+from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z
+from ftcc.sim.plants import conditions_of, cycle_of, find
 from ftcc.sim.spec import VehicleSpec, build
 
 __all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
@@ -50,6 +50,7 @@ def columns(plant: str, obstacles: bool = False) -> tuple[Column, ...]:
         *(Column(name, UNITS[name], "altitude, up" if name == "z" else "") for name in TRUTH),
         *(Column(f"{name}_command", unit_of(name), "command in force") for name in actuators),
         *(Column(name, unit_of(name), "what acts on the airframe") for name in actuators),
+        *(Column(name, unit, "true value") for name, unit in conditions_of(plant)),
         *([_CLEARANCE] if obstacles else []),
     )
 
@@ -61,8 +62,7 @@ def truth_array(plant: str) -> tuple[str, ...]:
         *TRUTH,
         *(f"{name}_command" for name in actuators),
         *actuators,
-        *(f"{name}_effectiveness" for name in actuators),
-        *(f"{name}_bias" for name in actuators),
+        *(name for name, _ in conditions_of(plant)),
         "late",
     )
 
@@ -85,7 +85,7 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     cycle.report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
     cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
-    effects(fleet, 0, 0.0)
+    cycle.conditions(fleet, 0, 0.0, np.zeros(8 + fleet.disturbed.shape[1]))
     clearance(fleet.zones, 0.0, 0.0)
 
 
@@ -110,6 +110,7 @@ class Vehicles:
         self.received = np.zeros((k, 4))
         self.targets = np.zeros((k, 7))
         self.late = np.zeros(k, np.int64)
+        self.conditions = np.zeros(len(conditions_of(specs[0].plant)))
         self.tick = 0
         ports = [setting.ports[spec.uav] for spec in specs]
         self.pilots = [
@@ -254,13 +255,16 @@ class Vehicles:
                 if self.alive[i]:
                     true = self.true[i]
                     over = (clearance(self.fleet.zones, true[X], true[Z]),) if spec.obstacles else ()
-                    self.parts[i].row(
-                        (self.now_us / 1e6, spec.uav, *true, *self.fleet.command[i], *self.fleet.acting[i], *over)
-                    )
+                    self.parts[i].row((self.now_us / 1e6, spec.uav, *self.known(i), *over))
         if self.fleet.happenings.used[0]:
             for at_us, i, _, number in drained(self.fleet.happenings):
                 uav = self.specs[i].uav
                 self.gate.tell(Said("warning", entered_text(uav, number), uav, at_us))
+
+    def known(self, i: int) -> list[float]:
+        """What only the simulator knows of vehicle ``i`` now, in the order of the `truth_array`."""
+        self.cycle.conditions(self.fleet, i, self.now_us / 1e6, self.conditions)
+        return [*self.true[i], *self.fleet.command[i], *self.fleet.acting[i], *self.conditions]
 
     def advance(self) -> None:
         """Fly one period; a vehicle that leaves its model is lost."""
@@ -284,9 +288,8 @@ class Vehicles:
             return
         for i in range(len(self.specs)):
             if self.alive[i]:
-                values = [*self.true[i], *self.fleet.command[i], *self.fleet.acting[i]]
-                values += effects(self.fleet, i, self.now_us / 1e6)
-                self.station[i].send(float_array(self.now_us, "truth", [*values, float(self.late[i])]))
+                truth = [*self.known(i), float(self.late[i])]
+                self.station[i].send(float_array(self.now_us, "truth", truth))
         for part in self.parts:
             part.flush_if_due()
 

@@ -24,11 +24,12 @@ from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.groundside.simulate import loop_of
 from ftcc.link.actuators import ACTUATORS
-from ftcc.link.channel import Channel, Inbox
+from ftcc.link.channel import LINK_REPORT, Channel, Inbox
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim.airframe import Airframe
 from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
+from ftcc.sim.plants import conditions_of
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.spec import build as build_fleet
 
@@ -194,7 +195,9 @@ class Swarm:
             np.full((rows, k, len(TRUTH)), math.nan),
             np.full((rows, k, len(ACTUATORS)), math.nan),
             np.full((rows, k, len(ACTUATORS)), math.nan),
+            np.full((rows, k, len(conditions_of("longitudinal"))), math.nan),
             np.full((rows, k, len(self.scheme.signals)), math.nan),
+            np.full((rows // self.timing.report_every + 1, *self.inbox.valid.shape, len(LINK_REPORT)), math.nan),
             np.zeros(k, np.int64),
             np.zeros(k, np.int64),
         )
@@ -214,7 +217,8 @@ class Swarm:
         t = self.timing
         self.loop.fly(
             self.fleet, self.autopilots, self.inbox, self.events, self.ether, self.recording, self._scratch,
-            t.period_us, t.exchange_us, t.latency_us, t.step_us, t.record_every, t.seed, self.form == "flight",
+            t.period_us, t.exchange_us, t.latency_us, t.step_us, t.record_every, t.report_every, t.seed,
+            self.form == "flight",
             first, t.ticks + 1 if last is None else last,
         )  # fmt: skip
         return self

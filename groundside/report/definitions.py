@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.metrics import DERIVED, check_expression
+from ftcc.groundside.metrics import check_expression
 from ftcc.groundside.schema import Id, Strict
+from ftcc.link.actuators import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,7 +138,7 @@ def plain_sheet(mission: Mission) -> Sheet:
         if panels:
             figures.append(Figure(name=name, title=title, panels=panels))
     commands = [
-        Panel(y=f"{name}_command", label=f"{name} command", unit="N" if name == "thrust" else "rad", limits=name)
+        Panel(y=f"{name}_command", label=f"{name} command", unit=unit_of(name), limits=name)
         for name in mission.scheme.commands
     ]
     figures.append(Figure(name="commands", title="Commands", panels=commands))
@@ -152,7 +153,7 @@ def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
         expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true) if e is not None]
         for expression in dict.fromkeys(expressions):
             try:
-                check_expression(expression, [*columns, *DERIVED])
+                check_expression(expression, ["t", *columns])
             except ValueError as error:
                 wrong.append(f"figure {figure.name}: {error}")
     return wrong

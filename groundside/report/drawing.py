@@ -21,15 +21,15 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.palette import GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
-from ftcc.groundside.report.definitions import Figure, Panel
-from ftcc.link.actuators import ACTUATORS
+from ftcc.groundside.report.definitions import Panel
+from ftcc.link.actuators import SLOT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ftcc.groundside.mission import Mission
 
-__all__ = ["Drawn", "draw", "draw_timeline", "save"]
+__all__ = ["Drawn", "draw", "draw_timeline", "figure_of", "save"]
 
 Array = NDArray[np.float64]
 
@@ -86,9 +86,9 @@ class Drawn:
     files: tuple[Path, ...]
 
 
-def draw(figure: Figure, flights: Sequence[Flown]) -> Any | None:
-    """A figure of one flight, colours by UAV, or of several, colours by flight; None if none has what it shows."""
-    panels = [panel for panel in figure.panels if any(drawable(panel, flight) for flight in flights)]
+def draw(asked: Sequence[Panel], flights: Sequence[Flown]) -> Any | None:
+    """Panels of one flight, colours by UAV, or of several, colours by flight; None if none has what they show."""
+    panels = [panel for panel in asked if any(drawable(panel, flight) for flight in flights)]
     if not panels:
         return None
     with plt.rc_context(_STYLE):
@@ -123,9 +123,9 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
                 break
         if n == 0:
             _draw_bounds(axes, panel, flight)
-    if panel.limits is not None and panel.limits in ACTUATORS:
+    if panel.limits is not None:
         follower = next(spec for spec in flights[0].mission.vehicles if spec.kind != "reference_point")
-        for limit in follower.limits[ACTUATORS.index(panel.limits)]:
+        for limit in follower.limits[SLOT[panel.limits]]:
             axes.axhline(limit, color=hexadecimal(GRAY), linewidth=0.8, linestyle=":")
     if panel.x == "t" and not several:
         _mark_events(axes, panel, flights[0])
@@ -226,12 +226,27 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
     return made
 
 
+def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
+    """Curves (name, colour, times, values) against time."""
+    with plt.rc_context(_STYLE):
+        made, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
+        for name, color, t, y in curves:
+            axes.plot(*_thinned(t, y), color=color, label=name)
+        axes.set(xlabel="t, s", ylabel=label)
+        axes.margins(x=0.01)
+        made.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
+    return made
+
+
 def save(made: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
     """Write a figure as SVG, PDF and PNG, and close it."""
     folder.mkdir(parents=True, exist_ok=True)
     buffer = io.StringIO()
     files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
     with plt.rc_context(_STYLE):
+        # The layout is found once, not once for each format.
+        made.draw_without_rendering()
+        made.set_layout_engine("none")
         made.savefig(buffer, format="svg", metadata={"Date": None})
         files[0].write_text(_small(buffer.getvalue()), encoding="utf-8")
         made.savefig(files[1], metadata={"CreationDate": None})

@@ -10,9 +10,20 @@ from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import Sheet, sheet_of
 from ftcc.groundside.report.drawing import Drawn, draw, draw_timeline, save
-from ftcc.groundside.report.page import Page, Section, claims_section, compared_section, events_section, plural, write
+from ftcc.groundside.report.links import links_section
+from ftcc.groundside.report.page import (
+    Cell,
+    Head,
+    Page,
+    Section,
+    claims_section,
+    compared_section,
+    events_section,
+    plural,
+    write,
+)
 from ftcc.groundside.report.readings import compare
-from ftcc.groundside.run import Run, RunError
+from ftcc.groundside.run import NothingRecordedError, Run
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
@@ -43,7 +54,7 @@ def write_report(run: Run, folder: Path | None = None) -> Path:
     try:
         signals: Any = run
         end = run.end
-    except RunError as error:
+    except NothingRecordedError as error:
         notes.append(f"{error}. What follows is what the scenario says and what was logged.")
         signals, end = _Nothing(), 0.0
     events = run.events
@@ -68,15 +79,22 @@ def write_report(run: Run, folder: Path | None = None) -> Path:
         compared = compare(sheet, flown)
         page.sections.append(compared_section(compared, sheet.source, mission.form, mission.variants, sheet.notes))
     page.sections.append(events_section(events, svg))
-    page.sections += _health(run, mission)
+    page.sections.append(links_section(run.links, mission, folder))
+    page.sections += _late_section(run)
+    page.sections += _versions_section(run)
     return write(page, folder / "index.html")
 
 
 def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path) -> list[Drawn]:
-    """Draw and write all figures of a sheet of which the flights have something."""
+    """Draw and write all figures of a sheet of which the flights have something.
+
+    Details show instants of the sheet's own scenarios and are left out for others.
+    """
     drawn = []
+    own = all(flight.mission.name in sheet.scenarios for flight in flights)
     for figure in sheet.figures:
-        made = draw(figure, flights)
+        panels = [panel for panel in figure.panels if own or panel.window is None]
+        made = draw(panels, flights)
         if made is not None:
             number = f"Figure {figure.number}" if figure.number else ""
             drawn.append(save(made, figure.name, figure.title, number, folder))
@@ -140,10 +158,17 @@ def _figures_note(sheet: Sheet, mission: Mission) -> str:
     return "What the scheme declares: motion, errors with their bounds, commands with their limits. Gray lines: events."
 
 
-def _health(run: Run, mission: Mission) -> list[Section]:
-    """Links and versions."""
-    from ftcc.groundside.report.page import Cell, Head
+def _late_section(run: Run) -> list[Section]:
+    """Late ticks by UAV, where there were any."""
+    told: dict[str, int] = next((event["late_of"] for event in reversed(run.events) if "late_of" in event), {})
+    rows = [[Cell(f"UAV {uav}"), Cell(str(late))] for uav, late in told.items() if late]
+    if not rows:
+        return []
+    before = ["Ticks in which a command came too late and the last one was held: the computer was overloaded."]
+    return [Section("late", "Late ticks", before, heads=[Head("UAV"), Head("late ticks", True)], rows=rows)]
 
+
+def _versions_section(run: Run) -> list[Section]:
     flown = run.scenario.plan.flown
     if flown is None or not flown.versions:
         return []

@@ -7,10 +7,10 @@ import importlib
 import pkgutil
 from types import ModuleType
 
-from ftcc.link.actuators import SLOT
+from ftcc.link.actuators import SLOT, unit_of
 from ftcc.link.compiled import instantiate
 
-__all__ = ["cycle_of", "find", "name_of", "names"]
+__all__ = ["conditions_of", "cycle_of", "find", "name_of", "names"]
 
 _REQUIRED = ("State", "Inputs", "Disturbances", "Parameters")
 _LISTS = ("ACTUATORS", "COMPLETED", "DISTURBANCES", "SERVES", "START")
@@ -48,6 +48,16 @@ def find(name: str) -> ModuleType:
     if unknown:
         raise TypeError(f"plant {name}: actuators {', '.join(unknown)} have no slot in ftcc.link.actuators")
     return module
+
+
+def conditions_of(plant: str) -> tuple[tuple[str, str], ...]:
+    """Names and units of what only the simulator knows of a vehicle: effectiveness, bias, disturbances."""
+    module = find(plant)
+    return (
+        *((f"{name}_effectiveness", "-") for name in module.ACTUATORS),
+        *((f"{name}_bias", unit_of(name)) for name in module.ACTUATORS),
+        *module.DISTURBANCES,
+    )
 
 
 def cycle_of(plant: str) -> ModuleType:

@@ -69,7 +69,7 @@ def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome
 
 
 def test_report_prints_the_claims_and_ends_with_0_if_all_hold(ftcc: Callable[..., Outcome], demo_run: Run) -> None:
-    code, out, _ = ftcc("report", demo_run.path)
+    code, out, _ = ftcc("report", demo_run.path, "--no-page")
     assert code == 0
     assert "8 of 8 claims hold" in out
     assert "altitude tracking of UAV 1 at its fault" in out
@@ -101,19 +101,40 @@ def test_report_says_null_for_what_was_not_flown(ftcc: Callable[..., Outcome], t
 
 def test_report_ends_with_1_if_a_claim_fails(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
     ftcc("simulate", "demo", "--duration", 30, "--out", tmp_path / "bad", "--set", "claims.2.expected.flight=0.1")
-    code, out, _ = ftcc("report", tmp_path / "bad")
+    code, out, _ = ftcc("report", tmp_path / "bad", "--no-page")
     assert code == 1
     assert "FAILS" in out
 
 
 def test_report_exports(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
     ftcc("simulate", "demo", "--duration", 1, "--out", tmp_path / "run")
-    code, _, err = ftcc("report", "run", "--csv", "flight.csv", "--mat", "flight.mat", "--figures")
+    code, _, err = ftcc("report", "run", "--csv", "flight.csv", "--mat", "flight.mat")
     assert code == 0
     assert "wrote flight.csv" in err
     assert (tmp_path / "flight.csv").read_text().startswith('"t","uav","x"')
     assert (tmp_path / "flight.mat").stat().st_size > 1000
-    assert {path.name for path in (tmp_path / "run" / "report").iterdir()} >= {"altitudes.png", "elevators.png"}
+    assert "wrote run/report/index.html" in err
+    assert {path.name for path in (tmp_path / "run" / "report").iterdir()} >= {"altitude.png", "elevator.pdf"}
+
+
+def test_compare_lays_runs_over_each_other(ftcc: Callable[..., Outcome], tmp_path: Path, demo_run: Run) -> None:
+    assert ftcc("simulate", "demo", "--duration", 8, "--out", "lossy", "--set", "channel.loss=0.3")[0] == 0
+    code, out, err = ftcc("compare", demo_run.path, "lossy", "--out", "compared")
+    assert code == 0
+    assert "flight channel.loss=0.3" in out
+    assert "wrote compared/index.html" in err
+    assert (tmp_path / "compared" / "altitude.svg").exists()
+
+
+def test_a_run_without_a_row_is_reported_as_far_as_it_goes(
+    ftcc: Callable[..., Outcome], tmp_path: Path, demo_run: Run
+) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "scenario.toml").write_text((demo_run.path / "scenario.toml").read_text())
+    code, _, err = ftcc("report", "run")
+    assert code == 1
+    assert "nothing was recorded" in err
+    assert (tmp_path / "run" / "report" / "index.html").exists()
 
 
 @pytest.mark.parametrize(
@@ -129,6 +150,8 @@ def test_report_exports(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
         (("check", "missing.toml"), ["missing.toml", "no such file"]),
         (("report", "nowhere"), ["nowhere", "no scenario.toml"]),
         (("report",), ["RUN"]),
+        (("compare", "nowhere"), ["two runs"]),
+        (("compare", "nowhere", "elsewhere"), ["nowhere", "no run's folder"]),
         (("launch",), ["launch"]),
     ],
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else "",

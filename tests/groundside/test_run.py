@@ -18,11 +18,13 @@ from ftcc.groundside import Run, RunError, load, resolve
 from ftcc.groundside.run import new_folder
 from ftcc.groundside.simulate import fly, simulate
 from ftcc.link.recording import PartWriter, part_path
+from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns as vehicle_columns
 
 TRUTH = ["x", "y", "z", "V", "gamma", "chi", "mu", "alpha", "beta", "theta", "p", "q", "r"]
 COMMANDED = ["thrust_command", "elevator_command", "aileron_command", "rudder_command"]
 ACTING = ["thrust", "elevator", "aileron", "rudder"]
+CONDITIONS = [name for name, _ in conditions_of("longitudinal")]
 
 
 def write_parts(run: Run, folder: Path, keep: Callable[[int, str], int | None] = lambda uav, role: None) -> Run:
@@ -46,7 +48,7 @@ def write_parts(run: Run, folder: Path, keep: Callable[[int, str], int | None] =
 def test_the_recording_has_a_row_per_tick_and_uav_and_the_columns_in_their_order(demo_run: Run) -> None:
     table = demo_run.signals
     signals = [quantity.name for quantity in demo_run.mission.scheme.signals]
-    assert table.column_names == ["t", "uav", *TRUTH, *COMMANDED, *ACTING, *signals]
+    assert table.column_names == ["t", "uav", *TRUTH, *COMMANDED, *ACTING, *CONDITIONS, *signals]
     assert table.num_rows == 8 * 12001
     assert table.column("t").to_pylist()[:9] == [0.0] * 8 + [0.01]
     assert table.column("uav").to_pylist()[:9] == [1, 2, 3, 4, 5, 6, 7, 8, 1]

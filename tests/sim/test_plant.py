@@ -12,12 +12,13 @@ from scipy.integrate import solve_ivp
 
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.sim.airframe import longitudinal_rates
-from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, Guards, actuate, effects
-from ftcc.sim.plants import cycle_of
+from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, Guards, actuate
+from ftcc.sim.plants import conditions_of, cycle_of
 from ftcc.sim.spec import VehicleSpec, build
 from tests.swarm import AIRFRAME, LEADER, TRIM, vehicle
 
-advance, truth = cycle_of("longitudinal").advance, cycle_of("longitudinal").truth
+cycle = cycle_of("longitudinal")
+advance, conditions, truth = cycle.advance, cycle.conditions, cycle.truth
 
 STEP = 1000
 LAG = (0.0, 20.0, 0.0, 20.0)
@@ -226,9 +227,22 @@ def test_the_latest_fault_of_an_actuator_counts_and_a_repair_is_one():
     )
     elevator = acting_over_time(spec)
     assert [elevator(t) for t in (0.1, 0.3, 0.5, 0.7)] == pytest.approx([-0.25, -0.025, -0.025, -0.25])
-    fleet = build([spec])
-    assert effects(fleet, 0, 0.5) == pytest.approx([1.0, 0.5, 1.0, 0.9, 0.0, 0.1, 0.0, 0.0])
-    assert effects(fleet, 0, 0.7) == pytest.approx([1.0, 1.0, 1.0, 0.9, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_the_conditions_of_a_vehicle_are_its_faults_and_disturbances():
+    faults = (Fault(0.2, ELEVATOR, 0.5, 0.1, 0.0, 0.0), Fault(0.4, THRUST, 0.9, 0.0, 0.0, 0.0))
+    fleet = build([vehicle(faults=faults, disturbances=(Disturbance(0.6, 1.0, 0.3, 0.0),))])
+    names = [name for name, _ in conditions_of("longitudinal")]
+
+    def at(time):
+        found = np.zeros(len(names))
+        conditions(fleet, 0, time, found)
+        return {name: value for name, value in zip(names, found, strict=True) if value not in (0.0, 1.0)}
+
+    assert at(0.1) == {}
+    assert at(0.3) == {"elevator_effectiveness": 0.5, "elevator_bias": 0.1}
+    assert at(0.5) == {"thrust_effectiveness": 0.9, "elevator_effectiveness": 0.5, "elevator_bias": 0.1}
+    assert at(0.7)["d2"] == 0.3
 
 
 def test_only_the_faulty_aircraft_feels_its_fault():

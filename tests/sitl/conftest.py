@@ -16,6 +16,8 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
+from ftcc.groundside import Run
+
 FTCC = [sys.executable, "-m", "ftcc.groundside.cli"]
 
 
@@ -129,6 +131,11 @@ def events(folder: Path) -> list[dict[str, object]]:
 def same_flight(one: Path, other: Path) -> bool:
     """Whether two runs recorded the same, bit for bit (nan equals nan)."""
     a, b = (pq.read_table(folder / "signals.parquet") for folder in (one, other))
+    links = [Run(folder).links for folder in (one, other)]
     return a.schema.equals(b.schema, check_metadata=True) and all(
-        np.array_equal(a[name].to_numpy(), b[name].to_numpy(), equal_nan=True) for name in a.column_names
+        np.array_equal(ours, theirs, equal_nan=True)
+        for ours, theirs in [
+            *((a[name].to_numpy(), b[name].to_numpy()) for name in a.column_names),
+            *((links[0][name], links[1][name]) for name in links[0]),
+        ]
     )

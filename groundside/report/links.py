@@ -1,0 +1,74 @@
+"""What a run recorded of its links: a table of edges, and how old was what each UAV heard."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftcc.groundside.palette import colors, hexadecimal
+from ftcc.groundside.report.drawing import figure_of, save
+from ftcc.groundside.report.page import Cell, Head, Section
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["links_section"]
+
+
+def links_section(links: dict[str, Any], mission: Mission, folder: Path) -> Section:
+    """Records sent, received and lost on each edge, and their age; a run without any says so."""
+    if not len(links["t"]):
+        return Section("links", "Links", before=["Nothing was recorded of the links."])
+    rows = []
+    for receiver in mission.uavs:
+        for sender in mission.graph.senders(receiver):
+            of_edge = (links["uav"] == receiver) & (links["sender"] == sender)
+            if of_edge.any():
+                rows.append(_row(receiver, sender, {name: values[of_edge] for name, values in links.items()}))
+    heads = [Head("from"), Head("to"), Head("sent", True), Head("received", True), Head("lost by the channel", True)]
+    heads += [Head("not delivered", True), Head("mean age, s", True), Head("greatest age, s", True)]
+    end = float(links["t"].max())
+    before = [
+        f"As the receivers counted until {end:g} s. Lost: by the emulated channel, cuts included. Not delivered: what "
+        "the mesh itself did not bring, which only an overloaded computer shows."
+    ]
+    return Section("links", "Links", before, svg=_ages(links, mission, folder), heads=heads, rows=rows)
+
+
+def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:
+    sent, received, lost = (int(edge[name][-1]) for name in ("sent", "received", "lost"))
+    missing = sent - received - lost
+    share = f" ({100.0 * lost / sent:.1f} %)" if lost else ""
+    heard = np.isfinite(edge["age"])
+    mean = f"{edge['age'][heard].mean():.3f}" if heard.any() else "never heard"
+    greatest = f"{edge['oldest'][heard].max():.3f}" if heard.any() else ""
+    return [
+        Cell(f"UAV {sender}"),
+        Cell(f"UAV {receiver}"),
+        Cell(str(sent)),
+        Cell(str(received)),
+        Cell(f"{lost}{share}", "warning" if lost else ""),
+        Cell(str(missing), "error" if missing else ""),
+        Cell(mean),
+        Cell(greatest),
+    ]
+
+
+def _ages(links: dict[str, Any], mission: Mission, folder: Path) -> str:
+    """The greatest age of what each UAV heard of any neighbour, by time."""
+    tints = colors(mission.uavs)
+    curves = []
+    for uav in mission.uavs:
+        own = links["uav"] == uav
+        t = np.unique(links["t"][own])
+        oldest = np.full(len(t), np.nan)
+        np.fmax.at(oldest, np.searchsorted(t, links["t"][own]), links["oldest"][own])
+        if np.isfinite(oldest).any():
+            curves.append((f"UAV {uav}", hexadecimal(tints[uav]), t, oldest))
+    if not curves:
+        return ""
+    made = figure_of(curves, "greatest age heard, s")
+    return save(made, "links", "Greatest age of what each UAV heard", "", folder).svg
