@@ -148,6 +148,10 @@ class Scheme:
     def _declared(self, name: str) -> Any:
         return getattr(self.module, name, _DEFAULTS[name])
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """To another process a scheme goes by name: its functions are there already."""
+        return load, (self.name, self.module.__name__)
+
     @property
     def title(self) -> str:
         return (self.module.__doc__ or self.name).strip().splitlines()[0].rstrip(".")

@@ -1,10 +1,10 @@
 """Numbers that a flight shows: metrics by name, over expressions of the recording's columns.
 
 An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
-same times, ``total(z)`` and ``largest(z)`` are taken over all followers, ``disagreement(z)`` = sum_j a_ij (z_i - z_j) over
-those whom a follower hears. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d`` and
-``z_d`` (the position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below all leaders) and
-``hull_distance_x`` (how far ahead of or behind them).
+same times, ``total(z)`` and ``largest(z)`` are taken over all followers, ``disagreement(z)`` = sum_j a_ij (z_i - z_j)
+over those whom a follower hears. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d``
+and ``z_d`` (the position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below
+all leaders) and ``hull_distance_x`` (how far ahead of or behind them).
 """
 
 from __future__ import annotations

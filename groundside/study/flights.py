@@ -13,7 +13,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -22,7 +22,6 @@ from typing import Any
 
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.launcher import no_main_module
-from ftcc.groundside.mission import resolve
 from ftcc.groundside.simulate import PlainPython, fly, record
 from ftcc.groundside.study.plan import Study, Trial
 
@@ -182,9 +181,9 @@ def _begin(study: Study, record_in: Path | None, stop: Any) -> None:
 def _fly(trial: Trial) -> Outcome:
     """Fly one trial; whatever goes wrong with it is its outcome."""
     study, record_in, stop = _work
-    problem = study.combinations[trial.combination].problem
-    if problem:
-        return Outcome(trial, (), {}, 0.0, problem)
+    mission = study.mission_of(trial)
+    if mission is None:
+        return Outcome(trial, (), {}, 0.0, study.combinations[trial.combination].problem)
 
     def go_on(_: float) -> None:
         if stop.is_set():
@@ -192,21 +191,14 @@ def _fly(trial: Trial) -> Outcome:
 
     begun = time.perf_counter()
     try:
-        results, lost = _flown(study, trial, record_in, go_on)
+        flight = fly(mission, go_on)
+        if record_in is not None:
+            record(flight, run_folder(record_in, trial))
+        results = evaluate(flight, mission.claims, mission.case, mission.graph)
     except _StoppedError:
         raise
     except Exception as error:  # a flight that fails is a row of the table, not the end of the study
         where = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
         return Outcome(trial, (), {}, time.perf_counter() - begun, text)
-    return Outcome(trial, tuple(results), lost, time.perf_counter() - begun, "")
-
-
-def _flown(
-    study: Study, trial: Trial, record_in: Path | None, go_on: Callable[[float], None]
-) -> tuple[Iterable[Result], dict[int, tuple[float, str]]]:
-    mission = resolve(study.scenario(trial))
-    flight = fly(mission, go_on)
-    if record_in is not None:
-        record(flight, run_folder(record_in, trial))
-    return evaluate(flight, mission.claims, mission.case, mission.graph), flight.lost
+    return Outcome(trial, tuple(results), flight.lost, time.perf_counter() - begun, "")

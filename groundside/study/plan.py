@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
+import functools
 import itertools
 import tomllib
 from collections.abc import Sequence
@@ -38,10 +38,12 @@ class Combination:
 
     values: tuple[Any, ...]
     """In the order of the study's variations."""
+    mission: Mission | None
+    """With the first seed; None if it cannot fly."""
     in_case: bool
     """Whether this is the scenario's case itself, for which its claims give expected values."""
-    problem: str
-    """Why it cannot fly; empty if it can."""
+    problem: str = ""
+    """Why it cannot fly."""
 
 
 @dataclass(frozen=True)
@@ -57,23 +59,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Study:
-    """A scenario, and what is varied in it."""
+    """A scenario, and what is varied in it; all is read and checked before the first flight, and then stays."""
 
-    name: str | Path
-    form: str | None
-    variants: tuple[str, ...]
     settings: tuple[str, ...]
-    duration: float | None
+    """Those of all flights."""
     variations: tuple[Variation, ...]
+    combinations: tuple[Combination, ...]
     seeds: tuple[int, ...]
     """Of every combination, so that combinations are compared in the same weather."""
-    combinations: tuple[Combination, ...]
-
-    @property
-    def mission(self) -> Mission:
-        """That of the first combination that can fly; what all share is read from it."""
-        first = next(c for c in self.combinations if not c.problem)
-        return resolve(self._load(first.values, self.seeds[0]))
 
     @property
     def trials(self) -> list[Trial]:
@@ -81,33 +74,19 @@ class Study:
         pairs = itertools.product(range(len(self.combinations)), self.seeds)
         return [Trial(number, combination, seed) for number, (combination, seed) in enumerate(pairs)]
 
-    def scenario(self, trial: Trial) -> Scenario:
-        """The scenario of one flight."""
-        return self._load(self.combinations[trial.combination].values, trial.seed)
+    @property
+    def mission(self) -> Mission:
+        """That of the first combination that can fly; what all share is read from it."""
+        return next(c.mission for c in self.combinations if c.mission is not None)
 
-    def _load(self, values: Sequence[Any], seed: int) -> Scenario:
-        varied = [f"{v.key}={_toml(value)}" for v, value in zip(self.variations, values, strict=True)]
-        settings = [*self.settings, *varied]
-        return load(
-            self.name, form=self.form, variants=self.variants, settings=settings, seed=seed, duration=self.duration
-        )
-
-    def _planned(self) -> Study:
-        """The study with all combinations, each loaded and, but for problems that it then tells, resolved."""
-        published = load(self.name, form=self.form, variants=self.variants)
-        # A run that was flown with settings of its own is no case of its scenario any more.
-        case = None
-        if not (published.plan.flown and published.plan.flown.settings):
-            with contextlib.suppress(ScenarioError):
-                case = _essence(resolve(published))
-        combinations = []
-        for values in itertools.product(*(variation.values for variation in self.variations)):
-            chosen = self._load(values, self.seeds[0])
-            try:
-                combinations.append(Combination(values, _essence(resolve(chosen)) == case, ""))
-            except ScenarioError as error:
-                combinations.append(Combination(values, False, "; ".join(error.problems)))
-        return dataclasses.replace(self, combinations=tuple(combinations))
+    def mission_of(self, trial: Trial) -> Mission | None:
+        """The mission of one flight; None if it cannot fly."""
+        mission = self.combinations[trial.combination].mission
+        if mission is None:
+            return None
+        timing = dataclasses.replace(mission.timing, seed=trial.seed)
+        as_flown = tomli_w.dumps({**tomllib.loads(mission.toml), "seed": trial.seed})
+        return dataclasses.replace(mission, timing=timing, toml=as_flown)
 
 
 def plan_study(
@@ -150,14 +129,34 @@ def plan_study(
             raise StudyError(f"--vary {key}: is varied twice; give all its values at once")
         if key == "seed":
             raise StudyError("--vary seed: every combination flies with every seed; use --seeds and --seed")
-    first = load(name, form=form, variants=variants, settings=settings, seed=seed, duration=duration).plan.seed
-    study = Study(
-        name, form, tuple(variants), tuple(settings), duration, variations, tuple(range(first, first + seeds)), ()
-    )._planned()
-    if all(combination.problem for combination in study.combinations):
-        problems = dict.fromkeys(combination.problem for combination in study.combinations)
+    chosen = functools.partial(load, name, form=form, variants=variants)
+    first = chosen(settings=settings, seed=seed, duration=duration)
+    case = _case(chosen())
+    combinations = []
+    for values in itertools.product(*(variation.values for variation in variations)):
+        varied = [f"{key}={_toml(value)}" for key, value in zip(keys, values, strict=True)]
+        scenario = chosen(settings=[*settings, *varied], seed=first.plan.seed, duration=duration)
+        try:
+            mission = resolve(scenario)
+            combinations.append(Combination(values, mission, _essence(mission) == case))
+        except ScenarioError as error:
+            combinations.append(Combination(values, None, False, "; ".join(error.problems)))
+    if all(combination.problem for combination in combinations):
+        problems = dict.fromkeys(combination.problem for combination in combinations)
         raise StudyError("no combination can fly:\n" + "\n".join(problems))
-    return study
+    return Study(
+        first.settings, variations, tuple(combinations), tuple(range(first.plan.seed, first.plan.seed + seeds))
+    )
+
+
+def _case(published: Scenario) -> tuple[Any, ...] | None:
+    """The essence of the case that the claims speak of; None where that does not fly."""
+    if published.plan.flown and published.plan.flown.settings:
+        return None  # a run that was flown with settings of its own
+    try:
+        return _essence(resolve(published))
+    except ScenarioError:
+        return None
 
 
 def _essence(mission: Mission) -> tuple[Any, ...]:

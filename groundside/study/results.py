@@ -123,7 +123,7 @@ def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
     ]
     about = {
         "ftcc.study": str(SCHEMA_VERSION),
-        "ftcc.scenario": str(study.name),
+        "ftcc.scenario": mission.name,
         "ftcc.case": mission.case,
         "ftcc.settings": json.dumps(study.settings),
         "ftcc.duration": f"{mission.timing.duration:g}",

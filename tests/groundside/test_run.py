@@ -153,7 +153,7 @@ def test_csv_and_mat_hold_the_same_numbers(demo_run: Run, tmp_path: Path) -> Non
 def test_the_folder_of_a_new_run_is_never_one_that_holds_a_run(
     demo_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(RunError, match="already holds scenario.toml"):
+    with pytest.raises(RunError, match=r"already holds scenario\.toml"):
         new_folder("demo", demo_run.path)
     monkeypatch.chdir(tmp_path)
     assert new_folder("demo") != new_folder("demo")
