@@ -36,7 +36,7 @@ from ftcc.airside.references.profiles import (
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, OwnReference
-from ftcc.link.actuators import ACTUATORS, decode_command
+from ftcc.link.actuators import ACTUATORS, SLOT, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
 from ftcc.link.timing import Timing
@@ -82,7 +82,7 @@ class Autopilots(NamedTuple):
     leader: NDArray[np.int64]
     """(k,): 1 for a leader."""
     command: NDArray[np.float64]
-    """(k, 4): command in the order of ``ACTUATORS``."""
+    """(k, 4): command by slot."""
     target: NDArray[np.float64]
     """(k, 7): a leader's target (stamp s, x, y, z, vx, vy, vz), z up."""
     shared: NDArray[np.float64]
@@ -104,7 +104,7 @@ class Autopilots(NamedTuple):
     leader_shares: NDArray[np.int64]
     """(m,): which entries of its `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
-    """(n,): index into ``ACTUATORS`` of each of the scheme's commands."""
+    """(n,): slot of each of the scheme's commands."""
     mode: NDArray[np.int64]
     """(k,): see `modes`."""
     held_us: NDArray[np.int64]
@@ -215,7 +215,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             profile_triggers=triggers,
             profile_state=states,
             leader_shares=np.array(shares + [-1] * (values - len(shares)), np.int64),
-            actuator=np.array([ACTUATORS.index(name) for name in scheme.commands], np.int64),
+            actuator=np.array([SLOT[name] for name in scheme.commands], np.int64),
             mode=np.full(k, MISSION),
             held_us=np.zeros(k, np.int64),
         ),

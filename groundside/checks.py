@@ -9,6 +9,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from ftcc.airside.references.profiles import Profile, largest_acceleration, largest_climb
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
@@ -18,6 +20,7 @@ from ftcc.link.actuators import ACTUATORS, SLOT, unit_of
 from ftcc.link.graph import Graph, GraphError
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
+from ftcc.sim.plant import GAMMA, TRUTH, V, X, Z
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.trim import TrimError
 
@@ -320,11 +323,7 @@ def check_scheme(
         leader_climb=largest_climb(profiles, plan.duration),
         leader_speed_varies=len(speeds) > 1 or any(p.speed_wave for p in profiles.values()),
         leader_acceleration=largest_acceleration(profiles, plan.duration),
-        initial={
-            vehicle.uav: _motion(plants.find(vehicle.plant).State(*vehicle.initial))
-            for vehicle in vehicles
-            if vehicle.uav in graph.followers
-        },
+        initial={vehicle.uav: _motion(vehicle) for vehicle in vehicles if vehicle.uav in graph.followers},
     )
     alike: dict[Any, list[int]] = {}
     for uav in graph.followers:
@@ -344,17 +343,14 @@ def check_scheme(
     return flight
 
 
-def _motion(state: Any) -> Reference:
-    """The motion of an aircraft in that state."""
-    return Reference(
-        x=state.x,
-        V=state.V,
-        V_dot=0.0,
-        z=state.z,
-        z_dot=state.V * math.sin(state.gamma),
-        z_ddot=0.0,
-        x_dot=state.V * math.cos(state.gamma),
-    )
+def _motion(vehicle: VehicleSpec) -> Reference:
+    """The motion of an aircraft at its start."""
+    plant = plants.find(vehicle.plant)
+    true = np.zeros(len(TRUTH))
+    plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
+    speed, gamma = float(true[V]), float(true[GAMMA])
+    climb, forward = speed * math.sin(gamma), speed * math.cos(gamma)
+    return Reference(x=float(true[X]), V=speed, V_dot=0.0, z=float(true[Z]), z_dot=climb, z_ddot=0.0, x_dot=forward)
 
 
 def _speed(plan: Plan, uav: int) -> float:

@@ -17,7 +17,7 @@ from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear, report_link
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import DIVERGED, X, Z
+from ftcc.sim.plant import DIVERGED, X, Z, latch
 from ftcc.sim.sensors import encode_state
 
 __all__ = ["HISTORY", "Ether", "Recording", "fly"]
@@ -123,9 +123,10 @@ def _latch(fleet, autopilots, i, wire, buffer):
             as_sent(fleet.target[i, 1:])
     elif wire:
         encode_command(autopilots.command[i], autopilots.travel[i], buffer)
-        decode_command(buffer, fleet.travel[i], fleet.command[i])
+        decode_command(buffer, fleet.travel[i], buffer)
+        latch(fleet, i, buffer)
     else:
-        copy(autopilots.command[i], fleet.command[i])
+        latch(fleet, i, autopilots.command[i])
 
 
 @compiled

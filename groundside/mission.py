@@ -29,12 +29,14 @@ from ftcc.groundside.checks import (
     timing_of,
 )
 from ftcc.groundside.claims import check_claims
+from ftcc.groundside.fire import check_posts
 from ftcc.groundside.leaders import profiles_of
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
-from ftcc.groundside.schema import AirframeSheet, Claim, Lag, Plan, RateLimits
+from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, RateLimits
+from ftcc.groundside.schema_fire import PointMassSheet
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, SLOT, THRUST, in_slots, unit_of
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
@@ -42,7 +44,7 @@ from ftcc.link.timing import Timing
 from ftcc.sim import plants
 from ftcc.sim.airframe import scaled
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Guards
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Guards, Gust
 from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
 
 __all__ = ["Mission", "resolve"]
@@ -112,7 +114,11 @@ def resolve(scenario: Scenario) -> Mission:
     vehicles = [_aircraft(plan, uav, plant, true, limits, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
     findings.stop_if_refused()
-    check_faults(plan, plant, vehicles, findings)
+    model = _nominal(plan, sheet, limits)
+    if plan.fire is None:
+        check_faults(plan, plant, vehicles, findings)
+    else:
+        check_posts(plan, references, vehicles, model, findings)
 
     gains = gains_of(scenario, scheme, findings)
     flight = None
@@ -128,19 +134,6 @@ def resolve(scenario: Scenario) -> Mission:
     findings.refused += check_claims(plan.claims, graph, names)
     findings.stop_if_refused()
 
-    low, high = zip(*limits, strict=True)
-    model = Model(
-        **{name: float(getattr(sheet, name)) for name in Model._fields if name in type(sheet).model_fields},
-        thrust_min=low[THRUST],
-        thrust_max=high[THRUST],
-        elevator_min=low[ELEVATOR],
-        elevator_max=high[ELEVATOR],
-        aileron_min=low[AILERON],
-        aileron_max=high[AILERON],
-        rudder_min=low[RUDDER],
-        rudder_max=high[RUDDER],
-        lag=plan.plant.lag.elevator,
-    )
     autopilots = tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -184,8 +177,27 @@ def resolve(scenario: Scenario) -> Mission:
     )
 
 
-def _airframe(plan: Plan, sheet: AirframeSheet, plant: ModuleType, findings: Findings) -> tuple[float, ...]:
+def _nominal(plan: Plan, sheet: AirframeSheet | PointMassSheet, limits: tuple[tuple[float, float], ...]) -> Model:
+    """What the laws know of the aircraft."""
+    values = dict.fromkeys(Model._fields, 0.0)
+    if isinstance(sheet, PointMassSheet):
+        # (9.32) as a polar over the lift coefficient.
+        values |= {"CLa": 1.0, "CDa2": sheet.kd * sheet.kn**2 / sheet.g**2}
+    values |= {name: float(getattr(sheet, name)) for name in Model._fields if name in type(sheet).model_fields}
+    for name, slot in (("thrust", THRUST), ("elevator", ELEVATOR), ("aileron", AILERON), ("rudder", RUDDER)):
+        values[f"{name}_min"], values[f"{name}_max"] = limits[slot]
+    values["lag"] = plan.plant.lag.elevator
+    return Model(**values)
+
+
+def _airframe(
+    plan: Plan, sheet: AirframeSheet | PointMassSheet, plant: ModuleType, findings: Findings
+) -> tuple[float, ...]:
     """The true parameters of the plant."""
+    missing = [name for name in plant.Parameters._fields if name not in type(sheet).model_fields]
+    if missing:
+        findings.refuse(f"airframe = {plan.airframe!r}: lacks {', '.join(missing)}, which the plant needs")
+        findings.stop_if_refused()
     airframe = plant.Parameters(**{name: float(getattr(sheet, name)) for name in plant.Parameters._fields})
     try:
         airframe = scaled(airframe, plan.plant.coefficients)
@@ -200,7 +212,7 @@ def _initial_command(plan: Plan, plant: ModuleType, steady: dict[str, float]) ->
     return tuple(float(values.get(name, 0.0)) for name in in_slots(plant.ACTUATORS))
 
 
-def _by_slot(fields: Lag | RateLimits, plant: ModuleType) -> tuple[float, ...]:
+def _by_slot(fields: Lag | RateLimits | Damping, plant: ModuleType) -> tuple[float, ...]:
     return tuple(float(getattr(fields, name)) for name in in_slots(plant.ACTUATORS))
 
 
@@ -242,6 +254,9 @@ def _aircraft(
         limits=limits,
         lag=_by_slot(plan.plant.lag, plant),
         rate=_by_slot(plan.plant.rate_limits, plant),
+        damping=_by_slot(plan.plant.damping, plant),
+        delay=plan.plant.delay,
+        gust=_gust(plan, channels, findings),
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=tuple(
             Fault(
@@ -260,12 +275,27 @@ def _aircraft(
             for d in sorted(plan.disturbances, key=lambda d: d.at)
             if d.uavs is None or uav in d.uavs
             for name, value in d.values.items()
-        ),
+        )
+        + _mean_wind(plan, channels),
         noise=tuple(float(getattr(noise, name, 0.0)) * noise.factor for name in TRUTH),
         guards=_guards(plan),
         offset=start.get("y", 0.0),
         autothrottle=NO_AUTOTHROTTLE if throttle is None else Autothrottle(**throttle.model_dump()),
     )
+
+
+def _mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:
+    if plan.wind is None or plan.wind.mean == 0.0 or "wind" not in channels:
+        return ()
+    return (Disturbance(0.0, float(channels.index("wind")), plan.wind.mean, 0.0),)
+
+
+def _gust(plan: Plan, channels: list[str], findings: Findings) -> Gust:
+    if plan.wind is None:
+        return Gust()
+    if "gust" not in channels:
+        findings.refuse("wind: the plant flies in still air")
+    return Gust(plan.wind.gust, round(plan.wind.gust_period * 1e6), plan.seed)
 
 
 def _guards(plan: Plan) -> Guards:

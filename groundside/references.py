@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from ftcc.airside.references import attitude, longitudinal
 from ftcc.airside.spec import OwnReference
 from ftcc.groundside.checks import Findings
+from ftcc.groundside.fire import fire_texts, posts
 from ftcc.groundside.schema import Plan
 from ftcc.link.timing import Timing
 
 __all__ = ["own_references", "reference_texts"]
 
-_TABLES = {"longitudinal": "mission", "attitude": "attitude"}
+_TABLES = {"longitudinal": "mission", "attitude": "attitude", "position": "fire"}
 """The table of the scenario that says what a UAV refers to by itself, by the scheme's plant."""
 
 
@@ -35,6 +36,8 @@ def own_references(
         V = plan.mission.V
         constants = longitudinal.Reference(x=0.0, V=V, V_dot=0.0, z=0.0, z_dot=0.0, z_ddot=0.0, x_dot=V)
         return dict.fromkeys([*followers, *plan.leaders], OwnReference(constants))
+    if plant == "position":
+        return posts(plan, followers, findings)
     return {uav: _attitude(plan, uav, timing, findings) for uav in followers}
 
 
@@ -63,7 +66,7 @@ def _attitude(plan: Plan, uav: int, timing: Timing, findings: Findings) -> OwnRe
 
 def reference_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
     """The commands as events: time s, UAV (None: everybody), text."""
-    events: list[tuple[float, int | None, str]] = []
+    events = fire_texts(plan)
     for command in plan.attitude.commands if plan.attitude else ():
         asked = [
             f"{name} {math.degrees(value):g} deg"

@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.schema import AirframeSheet, Plan, fields_of
+from ftcc.groundside.schema_fire import PointMassSheet
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
 
@@ -164,7 +165,7 @@ def load(
     return Scenario(name, path, chosen, ordered, tuple(settings), plan, merged, document)
 
 
-def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet:
+def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet | PointMassSheet:
     """The sheet of a shipped airframe, or of a path relative to the scenario's file."""
     sheets = shipped("airframes")
     path = sheets.get(name_or_path, scenario_file.parent / name_or_path)
@@ -176,7 +177,10 @@ def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet:
                 f"there are {', '.join(sheets)}, or give a TOML file"
             ],
         )
-    return validate(AirframeSheet, read(path), path)
+    document = read(path)
+    if "kd" in document:
+        return validate(PointMassSheet, document, path)
+    return validate(AirframeSheet, document, path)
 
 
 def _require_tables(path: Path, document: dict[str, Any]) -> None:

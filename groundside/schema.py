@@ -6,24 +6,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ftcc.groundside.schema_base import Id, NotNegative, Positive, Probability, Strict
+from ftcc.groundside.schema_fire import FireEventFields, FireFields, WindFields
+
 __all__ = ["AirframeSheet", "ChannelFields", "Claim", "LeaderFields", "LinkEventFields", "Plan", "Start", "fields_of"]
 
-Id = Annotated[int, Field(ge=1, le=200)]
-"""MAVLink system id of a UAV."""
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Actuator = Literal["thrust", "elevator", "aileron", "rudder", "load_factor", "bank"]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Positive = Annotated[float, Field(gt=0.0)]
-
-
-class Strict(BaseModel):
-    """Fields that are not listed, nan and inf are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class AirframeSheet(Strict):
@@ -175,7 +167,9 @@ class Lag(Strict):
 
 
 class RateLimits(Strict):
-    """Fastest motion of each actuator, N/s, rad/s and 1/s; default: no limit."""
+    """Fastest motion of each actuator, N/s, rad/s and 1/s; inf, the default: no limit."""
+
+    model_config = ConfigDict(allow_inf_nan=True)
 
     thrust: Positive = math.inf
     elevator: Positive = math.inf
@@ -183,6 +177,17 @@ class RateLimits(Strict):
     rudder: Positive = math.inf
     load_factor: Positive = math.inf
     bank: Positive = math.inf
+
+
+class Damping(Strict):
+    """Of actuators of second order, whose ``lag`` is their natural frequency; 0: first order."""
+
+    thrust: float = Field(0.0, ge=0.0, lt=1.0)
+    elevator: float = Field(0.0, ge=0.0, lt=1.0)
+    aileron: float = Field(0.0, ge=0.0, lt=1.0)
+    rudder: float = Field(0.0, ge=0.0, lt=1.0)
+    load_factor: float = Field(0.0, ge=0.0, lt=1.0)
+    bank: float = Field(0.0, ge=0.0, lt=1.0)
 
 
 class Limits(Strict):
@@ -230,6 +235,8 @@ class Plant(Strict):
     )
     elevator_lift: bool = Field(True, description="false: CLde = 0")
     lag: Lag = Lag()
+    damping: Damping = Damping()
+    delay: int = Field(0, ge=0, le=10, description="samples by which a command acts later than it has to")
     limits: Limits
     rate_limits: RateLimits = RateLimits()
     autothrottle: AutothrottleFields | None = None
@@ -386,6 +393,9 @@ class DisturbanceFields(Strict):
     d1: float = Field(0.0, description="m/s^2, of the airspeed")
     d2: float = Field(0.0, description="rad/s, of the flight-path angle")
     d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
+    b_x: float = Field(0.0, description="m/s^2, north")
+    b_y: float = Field(0.0, description="m/s^2, east")
+    b_z: float = Field(0.0, description="m/s^2, up")
     onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
     uavs: list[Id] | None = Field(None, description="default: all followers")
 
@@ -486,6 +496,9 @@ class Plan(Strict):
     start: Starts
     mission: MissionFields | None = None
     attitude: AttitudeFields | None = None
+    fire: FireFields | None = None
+    fire_events: list[FireEventFields] = []
+    wind: WindFields | None = None
     leaders: dict[Id, LeaderFields] = {}
     obstacles: list[ObstacleFields] = []
     detection_range: float | None = Field(None, gt=0.0, description="m, at which the leaders detect an obstacle ahead")

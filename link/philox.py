@@ -10,10 +10,11 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["CHANNEL", "NOISE", "gaussian_pair", "philox", "uniform"]
+__all__ = ["CHANNEL", "GUST", "NOISE", "gaussian_pair", "philox", "uniform"]
 
 CHANNEL = 1
 NOISE = 2
+GUST = 3
 
 _MASK = 0xFFFFFFFF
 

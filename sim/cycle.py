@@ -12,7 +12,7 @@ from typing import Any
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, moved
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, hold_speed, stroke
+from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 
@@ -29,16 +29,18 @@ _Disturbances = plant.Disturbances
 _Parameters = plant.Parameters
 _rates = plant.rates
 _truth = plant.truth
+_airspeed = plant.airspeed
 _complete = plant.complete
 _lost = plant.lost
 _SLOTS = tuple(SLOT[name] for name in plant.ACTUATORS)
 _CHANNELS = len(plant.DISTURBANCES)
+_GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
 
 
 @compiled
 def _hold_speed(fleet, i):
     if fleet.autothrottle[i, 0] > 0.0:
-        hold_speed(fleet, i, fields(_State, fleet.state[i]).V)
+        hold_speed(fleet, i, _airspeed(fields(_State, fleet.state[i])))
 
 
 @compiled
@@ -66,6 +68,8 @@ def _step(fleet, i, parameters, time, h):
     begin, middle, end = _Inputs(a0, b0, c0, d0), _Inputs(a1, b1, c1, d1), _Inputs(a2, b2, c2, d2)
     for channel in range(_CHANNELS):
         fleet.disturbed[i, channel] = disturbance(fleet, i, channel, time)
+        if channel == _GUST:
+            fleet.disturbed[i, channel] += gust(fleet, i, time)
     d = fields(_Disturbances, fleet.disturbed[i])
     x = fleet.state[i]
     s = fields(_State, x)
@@ -122,7 +126,7 @@ def truth(fleet, i, time, out):
     if fleet.point[i] == 1:
         _point_truth(fleet, i, time, out)
     else:
-        _truth(fields(_State, fleet.state[i]), fleet.offset[i], out)
+        _truth(fields(_State, fleet.state[i]), fields(_Inputs, fleet.acting[i]), fleet.offset[i], out)
         _complete(out)
 
 

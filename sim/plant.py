@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import THRUST
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, copy
 from ftcc.link.happenings import Happenings
+from ftcc.link.philox import GUST, gaussian_pair, philox
 
 __all__ = [
     "DIVERGED",
@@ -26,10 +27,13 @@ __all__ = [
     "Fault",
     "Fleet",
     "Guards",
+    "Gust",
     "actuate",
     "disturbance",
     "fault",
+    "gust",
     "hold_speed",
+    "latch",
     "stroke",
 ]
 
@@ -110,6 +114,15 @@ class Autothrottle(NamedTuple):
     """N."""
 
 
+class Gust(NamedTuple):
+    """Turbulence along the track: a normal number that is drawn anew and held, each vehicle its own."""
+
+    deviation: float = 0.0
+    """m/s."""
+    period_us: int = 100_000
+    seed: int = 0
+
+
 class Fleet(NamedTuple):
     """The k vehicles of a process, a row each. Actuators stand in their slots, see ``link.actuators.SLOT``."""
 
@@ -127,12 +140,26 @@ class Fleet(NamedTuple):
     """(k, 4): actuator bandwidth, rad/s; 0 = none."""
     rate: NDArray[np.float64]
     """(k, 4): fastest motion of the actuator, rad/s or N/s; inf = no limit."""
+    damping: NDArray[np.float64]
+    """(k, 4): 0 = first order; else the damping, below 1, of a second-order actuator whose frequency is ``lag``."""
+    speed: NDArray[np.float64]
+    """(k, 4): rate of the position of second-order actuators."""
+    delayed: NDArray[np.float64]
+    """(k, d, 4): commands that wait for ``d`` further samples before they are in force, the oldest first."""
+    waiting: NDArray[np.int64]
+    """(k,): 1 once the first of them has come."""
     fault_before_lag: NDArray[np.float64]
     """(k,): 1 where a fault acts at the input of the lag, 0 where it acts on the position behind it."""
     faults: NDArray[np.float64]
     """(k, n, 6): see `Fault`, in order of time; unused rows have time inf."""
     disturbances: NDArray[np.float64]
     """(k, n, 4): see `Disturbance`; unused rows have time inf."""
+    gust_deviation: NDArray[np.float64]
+    """(k,): see `Gust`."""
+    gust_period_us: NDArray[np.int64]
+    """(k,)."""
+    gust_seed: NDArray[np.int64]
+    """(k,)."""
     guards: NDArray[np.float64]
     """(k, 4): see `Guards`."""
     airframe: NDArray[np.float64]
@@ -191,6 +218,38 @@ def disturbance(fleet, i, channel, time):
 
 
 @compiled
+def gust(fleet, i, time):
+    """Gust (m/s) on vehicle ``i`` at ``time`` (s), eq. (9.33)."""
+    if fleet.gust_deviation[i] == 0.0:
+        return 0.0
+    draw = int(time * 1e6) // fleet.gust_period_us[i]
+    u, v, _, _ = philox(fleet.gust_seed[i], draw & 0xFFFFFFFF, fleet.uav[i], GUST, 0)
+    first, _ = gaussian_pair(u, v)
+    return fleet.gust_deviation[i] * first
+
+
+@compiled
+def latch(fleet, i, command):
+    """Bring ``command`` (4,) into force, or the one that came before it by the vehicle's delay.
+
+    The first one counts as all that came before it.
+    """
+    line = fleet.delayed[i]
+    last = line.shape[0] - 1
+    if last < 0:
+        copy(command, fleet.command[i])
+        return
+    if fleet.waiting[i] == 0:
+        for n in range(last + 1):
+            copy(command, line[n])
+        fleet.waiting[i] = 1
+    copy(line[0], fleet.command[i])
+    for n in range(last):
+        copy(line[n + 1], line[n])
+    copy(command, line[last])
+
+
+@compiled
 def _saturated(fleet, i, actuator):
     asked = fleet.command[i, actuator]
     if actuator == THRUST and fleet.autothrottle[i, 0] > 0.0:
@@ -237,6 +296,17 @@ def _moved(before, target, lag, rate, since):
 
 
 @compiled
+def _swung(before, speed, target, frequency, damping, since):
+    """Position and rate of a second-order actuator ``since`` s after ``before`` and ``speed``, exactly."""
+    decay, beat = damping * frequency, frequency * math.sqrt(1.0 - damping * damping)
+    offset = before - target
+    lead = (speed + decay * offset) / beat
+    shrunk, cosine, sine = math.exp(-decay * since), math.cos(beat * since), math.sin(beat * since)
+    swing = shrunk * (offset * cosine + lead * sine)
+    return target + swing, shrunk * beat * (lead * cosine - offset * sine) - decay * swing
+
+
+@compiled
 def stroke(fleet, i, actuator, time, step):
     """Acting deflection at the beginning, middle and end of a ``step`` (s); lag and rate limit are integrated exactly.
 
@@ -253,6 +323,12 @@ def stroke(fleet, i, actuator, time, step):
         target = effectiveness * target + bias
         effectiveness, bias = 1.0, 0.0
     lag, rate = fleet.lag[i, actuator], fleet.rate[i, actuator]
+    if fleet.damping[i, actuator] > 0.0:
+        speed, damping = fleet.speed[i, actuator], fleet.damping[i, actuator]
+        middle, _ = _swung(before, speed, target, lag, damping, 0.5 * step)
+        after, fleet.speed[i, actuator] = _swung(before, speed, target, lag, damping, step)
+        fleet.position[i, actuator] = after
+        return effectiveness * before + bias, effectiveness * middle + bias, effectiveness * after + bias
     middle = _moved(before, target, lag, rate, 0.5 * step)
     after = _moved(before, target, lag, rate, step)
     fleet.position[i, actuator] = after

@@ -31,7 +31,7 @@ from ftcc.link.mavlink import (
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
 from ftcc.sim.obstacles import clearance, entered_text
-from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z
+from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z, latch
 from ftcc.sim.plants import conditions_of, cycle_of, find
 from ftcc.sim.spec import VehicleSpec, build
 
@@ -85,6 +85,7 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     cycle.report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
     cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
+    latch(fleet, 0, fleet.command[0].copy())
     cycle.conditions(fleet, 0, 0.0, np.zeros(8 + fleet.disturbed.shape[1]))
     clearance(fleet.zones, 0.0, 0.0)
 
@@ -108,6 +109,7 @@ class Vehicles:
         self.why = np.zeros(k, np.int64)
         self.answered = np.full(k, -1, np.int64)
         self.received = np.zeros((k, 4))
+        self.latched = np.zeros(4)
         self.targets = np.zeros((k, 7))
         self.late = np.zeros(k, np.int64)
         self.conditions = np.zeros(len(conditions_of(specs[0].plant)))
@@ -224,7 +226,8 @@ class Vehicles:
                 if spec.kind == "reference_point":
                     self.fleet.target[i] = self.targets[i]
                 else:
-                    decode_command(self.received[i], self.fleet.travel[i], self.fleet.command[i])
+                    decode_command(self.received[i], self.fleet.travel[i], self.latched)
+                    latch(self.fleet, i, self.latched)
 
     def answers_last(self, i: int) -> bool:
         """Whether the command in force of vehicle ``i`` answers its last state."""

@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.happenings import new_happenings
 from ftcc.sim.obstacles import Obstacle, zones_of
-from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards, Gust
 from ftcc.sim.plants import find
 
 __all__ = ["NO_AUTOTHROTTLE", "VehicleSpec", "build"]
 
 NO_AUTOTHROTTLE = Autothrottle(0.0, 0.0, 0.0)
+
+
+CALM = Gust()
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,11 @@ class VehicleSpec:
     offset: float
     """Lateral position at the start, m."""
     autothrottle: Autothrottle = NO_AUTOTHROTTLE
+    damping: tuple[float, ...] = (0.0,) * len(ACTUATORS)
+    """Of second-order actuators, below 1; 0 = first order."""
+    delay: int = 0
+    """Samples by which a command acts later than it has to."""
+    gust: Gust = CALM
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
     obstacles: tuple[Obstacle, ...] = ()
@@ -83,6 +91,13 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         limits=limits,
         lag=np.array([spec.lag for spec in specs], np.float64),
         rate=np.array([spec.rate for spec in specs], np.float64),
+        damping=np.array([spec.damping for spec in specs], np.float64),
+        speed=np.zeros((k, len(ACTUATORS))),
+        delayed=np.zeros((k, max(spec.delay for spec in specs), len(ACTUATORS))),
+        waiting=np.zeros(k, np.int64),
+        gust_deviation=np.array([spec.gust.deviation for spec in specs], np.float64),
+        gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
+        gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
         faults=_padded([spec.faults for spec in specs], len(Fault._fields)),
         disturbances=_padded([spec.disturbances for spec in specs], len(Disturbance._fields)),

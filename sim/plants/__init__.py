@@ -14,7 +14,7 @@ __all__ = ["conditions_of", "cycle_of", "find", "name_of", "names"]
 
 _REQUIRED = ("State", "Inputs", "Disturbances", "Parameters")
 _LISTS = ("ACTUATORS", "COMPLETED", "DISTURBANCES", "SERVES", "START")
-_FUNCTIONS = ("rates", "truth", "complete", "lost", "initial", "level")
+_FUNCTIONS = ("rates", "airspeed", "truth", "complete", "lost", "initial", "level")
 
 
 def names() -> list[str]:

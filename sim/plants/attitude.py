@@ -40,6 +40,7 @@ __all__ = [
     "Inputs",
     "Parameters",
     "State",
+    "airspeed",
     "complete",
     "initial",
     "level",
@@ -114,7 +115,13 @@ def _wrapped(angle):
 
 
 @compiled
-def truth(s, offset, out):
+def airspeed(s):
+    """Airspeed, m/s."""
+    return s.V
+
+
+@compiled
+def truth(s, u, offset, out):
     """Write the channels of ``plant.TRUTH`` that are states, course and bank within +-pi."""
     out[X], out[Y], out[Z], out[V] = s.x, s.y, s.z, s.V
     out[GAMMA], out[CHI] = s.gamma, _wrapped(s.chi)

@@ -20,6 +20,7 @@ __all__ = [
     "Inputs",
     "Parameters",
     "State",
+    "airspeed",
     "complete",
     "initial",
     "level",
@@ -70,7 +71,13 @@ def rates(s, u, d, a):
 
 
 @compiled
-def truth(s, offset, out):
+def airspeed(s):
+    """Airspeed, m/s."""
+    return s.V
+
+
+@compiled
+def truth(s, u, offset, out):
     """Write the channels of ``plant.TRUTH`` that are states; the plane lies at the lateral position ``offset``."""
     out[V], out[X], out[Y], out[Z] = s.V, s.x, offset, s.z
     out[GAMMA], out[THETA], out[Q] = s.gamma, s.theta, s.q

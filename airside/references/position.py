@@ -1,0 +1,169 @@
+"""A UAV's own place at a forest fire: the elliptical fire-spread model of chapter 9, a post that circles its border.
+
+The fire breaks out ``age`` seconds before t = 0; its half axes grow with ``spread_north`` and ``spread_east``, its
+centre drifts with the wind. A UAV's post is the border's point of phase omega t + phi, shifted by its safe distance.
+The axes stay north and east.
+
+The ground may tell another place or drift of the fire from one simulated time on, the same for all UAVs. The fire is
+there at once; the formation follows it through a shaper of limited speed and acceleration (not in the monograph).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.elements.filters import reference_shaper
+from ftcc.airside.scheme import Quantity
+from ftcc.link.compiled import compiled, fields
+
+__all__ = ["Command", "Fire", "Reference", "border", "centre", "moved", "refer", "start"]
+
+Q = Quantity
+
+
+class Reference(NamedTuple):
+    """Commanded motion of one UAV, north, east and up, and of the formation's centre."""
+
+    x: float
+    """m."""
+    y: float
+    z: float
+    x_dot: float
+    """m/s."""
+    y_dot: float
+    z_dot: float
+    x_ddot: float
+    """m/s^2."""
+    y_ddot: float
+    z_ddot: float
+    north: float
+    """Centre of the formation, m."""
+    east: float
+    north_dot: float
+    """m/s."""
+    east_dot: float
+    north_ddot: float
+    """m/s^2."""
+    east_ddot: float
+
+
+class Fire(NamedTuple):
+    """What a UAV knows of the fire and of its own post: its mission parameters."""
+
+    spread_north: Annotated[float, Q("a", "m/s", "growth of the northern half axis", 1.2)]
+    spread_east: Annotated[float, Q("b", "m/s", "growth of the eastern half axis", 0.8)]
+    age: Annotated[float, Q("age", "s", "time since the outbreak, at t = 0", 1800.0)]
+    omega: Annotated[float, Q("omega", "rad/s", "angular rate on the ellipse", 0.0327)]
+    phase: Annotated[float, Q("phi", "rad", "phase on the ellipse")]
+    safe_north: Annotated[float, Q("delta_1", "m", "safe distance, north")]
+    safe_east: Annotated[float, Q("delta_2", "m", "safe distance, east")]
+    altitude: Annotated[float, Q("delta_3", "m", "altitude")]
+    shift_speed: Annotated[float, Q("v_s", "m/s", "fastest motion of the centre (not in paper)", 4.0)]
+    shift_acceleration: Annotated[float, Q("a_s", "m/s^2", "its largest acceleration (not in paper)", 0.2)]
+
+
+class Command(NamedTuple):
+    """From ``at`` (s) on: the fire's centre is there and drifts like that."""
+
+    at: float
+    north: float
+    """m, at ``at``."""
+    east: float
+    drift_north: float
+    """m/s."""
+    drift_east: float
+
+
+@compiled
+def in_force(commands, t):
+    """The latest row of ``commands`` (n, 5) whose time has come, before the first one the first."""
+    latest = 0
+    for n in range(commands.shape[0]):
+        if commands[n, 0] <= t:
+            latest = n
+    return latest
+
+
+@compiled
+def centre(command, t):
+    """North and east (m) of the fire's centre at ``t`` (s) under a row of commands."""
+    return command[1] + command[3] * (t - command[0]), command[2] + command[4] * (t - command[0])
+
+
+def moved(
+    command: Command, at: float, centre_at: Sequence[float] | None = None, drift: Sequence[float] | None = None
+) -> Command:
+    """The command after ``command``: from ``at`` on another centre (m), another drift (m/s), or both."""
+    north, east = centre_at if centre_at is not None else centre(command, at)
+    return Command(at, north, east, *(drift if drift is not None else command[3:]))
+
+
+def border(fire: Fire, commands: Sequence[Command], t: float, points: int = 72) -> NDArray[np.float64]:
+    """Points (points + 1, 2) north and east on the border of the fire at ``t`` (s), a closed line."""
+    north, east = centre(commands[in_force(np.array(commands), t)], t)
+    theta = np.linspace(0.0, 2.0 * math.pi, points + 1)
+    grown = fire.age + t
+    return np.column_stack(
+        (north + fire.spread_north * grown * np.cos(theta), east + fire.spread_east * grown * np.sin(theta))
+    )
+
+
+@compiled
+def _follow(reference, command, t, fire, h):
+    """Advance the formation's centre by ``h`` seconds towards the fire's, as it is at ``t``, the step's beginning."""
+    north, east = centre(command, t)
+    # The shaper slows down over the distance that its acceleration allows.
+    w = 2.0 * fire.shift_acceleration / fire.shift_speed
+    for axis in range(2):
+        z, v, a = reference[9 + axis], reference[11 + axis], reference[13 + axis]
+        target, rate = (north, command[3]) if axis == 0 else (east, command[4])
+        v_rate, a_rate, jerk = reference_shaper(z, v, a, target, rate, w, fire.shift_speed, fire.shift_acceleration)
+        reference[9 + axis] = z + h * v_rate
+        reference[11 + axis] = v + h * a_rate
+        reference[13 + axis] = a + h * jerk
+
+
+@compiled
+def _place(reference, t, fire):
+    """The post of a UAV around the formation's centre."""
+    a, b, omega = fire.spread_north, fire.spread_east, fire.omega
+    s = fire.age + t
+    theta = omega * t + fire.phase
+    cosine, sine = math.cos(theta), math.sin(theta)
+    reference[0] = reference[9] + a * s * cosine + fire.safe_north
+    reference[1] = reference[10] + b * s * sine + fire.safe_east
+    reference[2] = fire.altitude
+    reference[3] = reference[11] + a * cosine - a * s * omega * sine
+    reference[4] = reference[12] + b * sine + b * s * omega * cosine
+    reference[5] = 0.0
+    reference[6] = reference[13] - 2.0 * a * omega * sine - a * s * omega * omega * cosine
+    reference[7] = reference[14] + 2.0 * b * omega * cosine - b * s * omega * omega * sine
+    reference[8] = 0.0
+
+
+@compiled
+def refer(parameters, commands, reference, now_us, period_us):
+    """Bring a UAV's reference to the tick at ``now_us``; until the fire is moved, its centre is followed exactly."""
+    fire = fields(Fire, parameters)
+    now = now_us / 1e6
+    latest = in_force(commands, now)
+    if latest == 0:
+        reference[9], reference[10] = centre(commands[0], now)
+        reference[11], reference[12] = commands[0, 3], commands[0, 4]
+        reference[13], reference[14] = 0.0, 0.0
+    elif now_us > 0:
+        before = (now_us - period_us) / 1e6
+        _follow(reference, commands[in_force(commands, before)], before, fire, period_us / 1e6)
+    _place(reference, now, fire)
+
+
+def start(fire: Fire, commands: Sequence[Command]) -> Reference:
+    """The reference at t = 0."""
+    row = np.zeros(len(Reference._fields))
+    refer(np.array(fire), np.array(commands[:1]), row, 0, 1)
+    return Reference(*row.tolist())

@@ -1,0 +1,21 @@
+"""What all tables of a scenario have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Id", "NotNegative", "Positive", "Probability", "Strict"]
+
+Id = Annotated[int, Field(ge=1, le=200)]
+"""MAVLink system id of a UAV."""
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class Strict(BaseModel):
+    """Fields that are not listed, nan and inf are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

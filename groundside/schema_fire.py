@@ -1,0 +1,77 @@
+"""What may stand in a scenario of chapter 9: the fire and the posts around it, wind, and its point-mass aircraft."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from ftcc.groundside.schema_base import Id, NotNegative, Positive, Strict
+
+__all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields", "WindFields"]
+
+
+class PointMassSheet(Strict):
+    """An aircraft as a point (SI units); names as in the monograph's (9.32)."""
+
+    title: str = ""
+    m: Positive
+    g: Positive
+    rho: Positive
+    S: Positive
+    T_max: Positive
+    CD0: NotNegative
+    kn: NotNegative
+    kd: NotNegative
+
+
+class PostFields(Strict):
+    """Where a UAV flies: a phase on the fire's border, and its safe distance from that point."""
+
+    phase: float = Field(description="rad, phi_i")
+    north: float = Field(0.0, description="m, delta_i1")
+    east: float = Field(0.0, description="m, delta_i2")
+    altitude: float = Field(gt=0.0, description="m, delta_i3")
+
+
+class FireFields(Strict):
+    """The elliptical fire-spread model of chapter 9, and the posts of all UAVs around it."""
+
+    spread: tuple[Positive, Positive] = Field(description="m/s, a and b: growth of the northern and eastern half axis")
+    age: float = Field(1800.0, gt=0.0, description="s, time since the outbreak at t = 0")
+    outbreak: tuple[float, float] = Field((0.0, 0.0), description="m, (x_f0, y_f0): where it broke out, north and east")
+    drift: tuple[float, float] = Field((0.0, 0.0), description="m/s, motion of its centre, north and east; c")
+    omega: float = Field(description="rad/s, angular rate of the UAVs on the ellipse; > 0: from north to east")
+    posts: dict[Id, PostFields]
+    shift_speed: float = Field(4.0, gt=0.0, description="m/s, fastest motion of the formation's centre")
+    shift_acceleration: float = Field(0.2, gt=0.0, description="m/s^2, its largest acceleration")
+    least_distance: float = Field(20.0, ge=0.0, description="m, which two posts keep at all times")
+    beyond_limits: bool = Field(False, description="true: fly although a limit is reached along the posts")
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if self.omega == 0.0:
+            raise ValueError("omega = 0: the UAVs would have to stand still; must not be 0")
+        return self
+
+
+class FireEventFields(Strict):
+    """From ``at`` on the fire's centre is elsewhere, or drifts otherwise, for all UAVs at once."""
+
+    at: float = Field(gt=0.0, description="s")
+    centre: tuple[float, float] | None = Field(None, description="m, north and east at that time; default: where it is")
+    drift: tuple[float, float] | None = Field(None, description="m/s, north and east; default: as before")
+
+    @model_validator(mode="after")
+    def _changes_something(self) -> Self:
+        if self.centre is None and self.drift is None:
+            raise ValueError("needs some of centre, drift")
+        return self
+
+
+class WindFields(Strict):
+    """Wind and gust, eq. (9.33)."""
+
+    mean: float = Field(0.0, ge=0.0, description="m/s, V_m")
+    gust: float = Field(0.0, ge=0.0, description="m/s, standard deviation of A, drawn for each UAV")
+    gust_period: float = Field(0.1, ge=0.001, description="s, for which a draw is held")
