@@ -187,6 +187,10 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     for i, spec in enumerate(specs):
         inbox.quality[i, :] = spec.channel
         weight[i, : len(spec.neighbours)] = [n.weight for n in spec.neighbours]
+        for edge, neighbour in enumerate(spec.neighbours):
+            if neighbour.briefing:
+                inbox.values[i, edge, : len(neighbour.briefing)] = neighbour.briefing
+                inbox.valid[i, edge] = 1.0
     shares = [Reference._fields.index(quantity.name) for quantity in scheme.shared.get("leader", ())]
     leader = np.array([spec.role == "leader" for spec in specs], np.int64)
     signals = np.zeros((k, len(scheme.signals)))

@@ -7,7 +7,7 @@ from typing import Any
 
 from ftcc.airside.scheme import Flight, Problem
 
-__all__ = ["above_leaders_climb", "largest_degree", "positive", "stable_in_steps"]
+__all__ = ["above_leaders_climb", "largest_degree", "not_negative", "positive", "stable_in_steps"]
 
 
 def positive(gains: Any, names: str) -> list[Problem]:
@@ -16,6 +16,15 @@ def positive(gains: Any, names: str) -> list[Problem]:
         Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
         for name in names.split()
         if not getattr(gains, name) > 0.0
+    ]
+
+
+def not_negative(gains: Any, names: str) -> list[Problem]:
+    """Every gain of ``names`` (separated by spaces) must be >= 0."""
+    return [
+        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be >= 0")
+        for name in names.split()
+        if not getattr(gains, name) >= 0.0
     ]
 
 

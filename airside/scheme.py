@@ -193,6 +193,11 @@ class Scheme:
         return self._declared("SWITCHES")  # type: ignore[no-any-return]
 
     @property
+    def briefed(self) -> bool:
+        """Whether every UAV knows how its neighbours move at t = 0, before it hears them."""
+        return bool(getattr(self.module, "BRIEFED", False))
+
+    @property
     def shared_width(self) -> int:
         return max(len(row) for row in self.shared.values())
 

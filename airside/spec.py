@@ -18,6 +18,8 @@ class Neighbour:
 
     uav: int
     weight: float
+    briefing: tuple[float, ...] = ()
+    """What is known before the first record: its shared values at t = 0; empty: nothing."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ftcc.link.actuators import encode_command
 from ftcc.link.channel import hear
 from ftcc.link.compiled import compiled, copy, fields, store, width
 
-__all__ = ["announce", "control", "hear_and_control", "refer"]
+__all__ = ["SWEEPS", "announce", "anticipate", "control", "hear_and_control", "refer"]
 
 if "scheme" not in globals():
     raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
@@ -40,6 +40,9 @@ _COMMANDS = len(scheme.COMMANDS)
 
 REFUSAL = ""
 """Why numba cannot compile the scheme, set by `autopilots.tick_of`; empty where it can."""
+
+SWEEPS: int = getattr(scheme, "SWEEPS", 1)
+"""Most exchanges of one instant where the exchange is ideal."""
 
 _LARGEST = 1e30
 """Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
@@ -94,6 +97,18 @@ def announce(autopilots, inbox, i):
     _begin(autopilots, inbox, i, own, reference, gains)
     output = fields(_Output, autopilots.output[i])
     store(_share(fields(_State, autopilots.state[i]), own, reference, output, gains), autopilots.shared[i])
+
+
+@compiled
+def anticipate(autopilots, inbox, i, dt):
+    """Set ``shared`` to what UAV ``i`` would share of this instant given what it has heard; no state advances."""
+    own = fields(Own, autopilots.own[i])
+    reference = fields(_Reference, autopilots.reference[i])
+    gains = fields(_Gains, autopilots.gains[i])
+    model = fields(Model, autopilots.model[i])
+    state = fields(_State, autopilots.state[i])
+    _, output = _step(state, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
+    store(_share(state, own, reference, output, gains), autopilots.shared[i])
 
 
 @compiled

@@ -27,6 +27,7 @@ from ftcc.sim.trim import TrimError
 __all__ = [
     "IDEAL",
     "Findings",
+    "briefings",
     "check_delays",
     "check_faults",
     "check_scheme",
@@ -343,6 +344,23 @@ def check_scheme(
     return flight
 
 
+def briefings(
+    scheme: Scheme, vehicles: list[VehicleSpec], profiles: dict[int, Profile]
+) -> dict[int, tuple[float, ...]]:
+    """What each UAV's hearers know of it before they hear it, by id: its shared values at t = 0, accelerations as 0."""
+    if not scheme.briefed:
+        return {}
+    known = {}
+    for vehicle in vehicles:
+        profile = profiles.get(vehicle.uav)
+        if profile is None:
+            role, motion = "follower", _motion(vehicle)
+        else:
+            role, motion = "leader", Reference(profile.x, profile.V, 0.0, profile.z, 0.0, 0.0, profile.V)
+        known[vehicle.uav] = tuple(float(getattr(motion, quantity.name)) for quantity in scheme.shared[role])
+    return known
+
+
 def _motion(vehicle: VehicleSpec) -> Reference:
     """The motion of an aircraft at its start."""
     plant = plants.find(vehicle.plant)
@@ -361,21 +379,37 @@ def _speed(plan: Plan, uav: int) -> float:
     return own.V or plan.start.V or math.nan
 
 
-def check_faults(plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], findings: Findings) -> None:
-    """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel."""
+def _commanded_speeds(profiles: dict[int, Profile], at: float) -> set[float]:
+    """The speeds that the leaders are commanded to at ``at`` (s); none if they never change."""
+    if len({speed for p in profiles.values() for speed in (p.V, *(command.speed for command in p.commands))}) < 2:
+        return set()
+    return {[p.V, *(command.speed for command in p.commands if command.at <= at)][-1] for p in profiles.values()}
+
+
+def check_faults(
+    plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
+) -> None:
+    """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel.
+
+    At the mission's speed, or every speed that leaders are commanded to while it lasts if they change theirs; under the
+    disturbances that act then.
+    """
+    changes = {command.at for p in profiles.values() for command in p.commands}
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
         vehicle = by_uav[fault.uav]
-        V = _speed(plan, fault.uav)
+        own = _speed(plan, fault.uav)
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
         end = min(later, default=math.inf)
         low, high = vehicle.limits[SLOT[fault.actuator]]
-        for at in sorted({fault.at} | {d.time for d in vehicle.disturbances if fault.at < d.time < end}):
+        times = changes | {disturbance.time for disturbance in vehicle.disturbances}
+        instants = sorted({fault.at} | {t for t in times if fault.at < t < min(end, plan.duration)})
+        for at, speed in [(t, v) for t in instants for v in sorted(_commanded_speeds(profiles, t) or {own})]:
             acting = {
                 name: sum(d.value for d in vehicle.disturbances if d.channel == channel and d.time <= at)
                 for channel, (name, _) in enumerate(plant.DISTURBANCES)
             }
-            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), V, f"faults.{n}", findings, **acting)
+            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
             needed = steady.get(fault.actuator, 0.0)
             command = (needed - fault.bias) / fault.effectiveness if fault.effectiveness > 0.0 else math.inf
             if low < command < high or (fault.effectiveness == 0.0 and needed == fault.bias):
@@ -383,7 +417,7 @@ def check_faults(plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], fin
             unit = unit_of(fault.actuator)
             text = (
                 f"faults.{n} (effectiveness {fault.effectiveness:g}, bias {fault.bias:g} {unit}): leaves "
-                f"UAV {fault.uav} no level trim at {V:g} m/s and t = {at:g} s: {fault.actuator} would need the command "
+                f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need the command "
                 f"({needed:.3f} - {fault.bias:g})/{fault.effectiveness:g} = {command:.3f} {unit}; "
                 f"allowed is {low:g} to {high:g}"
             )

@@ -29,7 +29,9 @@ tick: Any = globals()["tick"]
 cycle: Any = globals()["cycle"]
 
 _announce = tick.announce
+_anticipate = tick.anticipate
 _control = tick.control
+_SWEEPS = tick.SWEEPS
 _refer = tick.refer
 _actuate = cycle.actuate
 _truth = cycle.truth
@@ -39,6 +41,9 @@ _conditions = cycle.conditions
 
 HISTORY = 64
 """Records kept of each sender."""
+
+_SETTLED = 1e-6
+"""Exchanges of one instant end when no shared value moves by more, in its unit."""
 
 
 class Ether(NamedTuple):
@@ -112,6 +117,30 @@ def _receive(ether, inbox, events, i, now, latency, seed):
             radio_on = ether.radio_on[sender, slot] == 1 and events.radio_on[i] == 1
             admit(inbox, i, edge, sequence, stamp, radio_on, ether.values[sender, slot], latency, now, seed)
     hear(inbox, i, now)
+
+
+@compiled
+def _settle(ether, autopilots, inbox, lost, now, dt):
+    """Repeat the ideal exchange of this instant until the shared values have settled, all at once each time.
+
+    For a law whose shared values depend on what it hears of the same instant: an algebraic loop around the graph.
+    """
+    for _ in range(_SWEEPS - 1):
+        moved = 0.0
+        for i in range(lost.shape[0]):
+            if lost[i] == 0 and autopilots.leader[i] == 0:
+                _anticipate(autopilots, inbox, i, dt)
+                last = ether.values[i, (ether.sent[i] - 1) % HISTORY]
+                for m in range(last.shape[0]):
+                    moved = max(moved, abs(autopilots.shared[i, m] - last[m]))
+                copy(autopilots.shared[i], last)
+        for i in range(lost.shape[0]):
+            for edge in range(inbox.degree[i]):
+                if inbox.stamp[i, edge] == now:
+                    sender = ether.sender[i, edge]
+                    copy(ether.values[sender, (ether.sent[sender] - 1) % HISTORY], inbox.values[i, edge])
+        if moved <= _SETTLED:
+            break
 
 
 @compiled
@@ -192,6 +221,11 @@ def fly(
                     if autopilots.leader[i] == 0:
                         _announce(autopilots, inbox, i)
                     _send(ether, autopilots, events, i, now)
+            if _SWEEPS > 1:
+                for i in range(k):
+                    if recording.lost[i] == 0 and autopilots.leader[i] == 0:
+                        _receive(ether, inbox, events, i, now, latency, seed)
+                _settle(ether, autopilots, inbox, recording.lost, now, period / 1e6)
         for i in range(k):
             if recording.lost[i] == 0 and autopilots.leader[i] == 0:
                 _receive(ether, inbox, events, i, now, latency, seed)

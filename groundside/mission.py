@@ -17,6 +17,7 @@ from ftcc.airside.spec import AutopilotSpec, Neighbour
 from ftcc.groundside.checks import (
     IDEAL,
     Findings,
+    briefings,
     check_delays,
     check_faults,
     check_scheme,
@@ -116,7 +117,7 @@ def resolve(scenario: Scenario) -> Mission:
     findings.stop_if_refused()
     model = _nominal(plan, sheet, limits)
     if plan.fire is None:
-        check_faults(plan, plant, vehicles, findings)
+        check_faults(plan, plant, vehicles, profiles, findings)
     else:
         check_posts(plan, references, vehicles, model, findings)
 
@@ -134,6 +135,7 @@ def resolve(scenario: Scenario) -> Mission:
     findings.refused += check_claims(plan.claims, graph, names)
     findings.stop_if_refused()
 
+    known = briefings(scheme, vehicles, profiles)
     autopilots = tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -146,7 +148,9 @@ def resolve(scenario: Scenario) -> Mission:
             command=vehicle.command,
             travel=vehicle.travel,
             reference=references[vehicle.uav],
-            neighbours=tuple(Neighbour(j, graph.weights[vehicle.uav, j]) for j in graph.senders(vehicle.uav)),
+            neighbours=tuple(
+                Neighbour(j, graph.weights[vehicle.uav, j], known.get(j, ())) for j in graph.senders(vehicle.uav)
+            ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
             profile=profiles.get(vehicle.uav),

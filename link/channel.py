@@ -182,7 +182,9 @@ def hear(inbox, i, now):
                     _take(inbox, i, edge, stamp, inbox.slot_values[i, edge, slot])
         if inbox.stamp[i, edge] >= 0:
             inbox.valid[i, edge] = 1.0
-            age = max(0, now - inbox.stamp[i, edge]) / 1e6
+        if inbox.valid[i, edge] > 0.0:
+            # Values that were there before any record belong to t = 0.
+            age = max(0, now - max(0, inbox.stamp[i, edge])) / 1e6
             inbox.age[i, edge] = age
             inbox.ages[i, edge, 0] += age
             inbox.ages[i, edge, 1] += 1.0

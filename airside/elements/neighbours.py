@@ -43,11 +43,11 @@ def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):  # type: 
 
 
 @compiled
-def weighted_average(heard, column, oldest):  # type: ignore[no-untyped-def]
+def weighted_average(heard, column, oldest, horizon):  # type: ignore[no-untyped-def]
     """Average of the neighbours' value in ``column`` and of its rate in the next one, eqs. (4.10), (4.11).
 
-    Values are carried to the present by their rates; a neighbour whose record is older than ``oldest`` seconds, or who
-    was never heard, is left out.
+    Values are carried to the present by their rates, for at most ``horizon`` seconds; a neighbour whose record is older
+    than ``oldest`` seconds, or who was never heard, is left out.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def weighted_average(heard, column, oldest):  # type: ignore[no-untyped-def]
     for j in range(heard.weight.shape[0]):
         if heard.valid[j] > 0.0 and heard.age[j] <= oldest:
             weight = heard.weight[j]
-            value += weight * extrapolated(heard.values[j, column], heard.values[j, column + 1], heard.age[j], oldest)
+            value += weight * extrapolated(heard.values[j, column], heard.values[j, column + 1], heard.age[j], horizon)
             rate += weight * heard.values[j, column + 1]
             weights += weight
     if weights == 0.0:

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import above_leaders_climb, largest_degree, positive, stable_in_steps
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, not_negative, positive, stable_in_steps
 from ftcc.airside.elements.actuators import lead_filter
 from ftcc.airside.elements.filters import butterworth, complementary_rate, first_order_rate, limited_tracker
 from ftcc.airside.elements.neighbours import disagreement
@@ -407,6 +407,11 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
         gains,
         "k11 k12 beta1 phi tube_first tube_last tube_decay kl ku k21 k31 k41 k51 k52 tau1 tau2 tau3 w21 w22 w23 w24 "
         "g11 w41 w42 w43 w44 g21 mu network_filter inner servo",
+    )
+    problems += not_negative(
+        gains,
+        "k13 beta2 networks auxiliary xi_term estimator lead_slow lead_fast observer_limit rate_filter smoother a_max "
+        "altitude_filter gamma_limit theta_limit q_limit cap horizon",
     )
     if problems:
         return problems

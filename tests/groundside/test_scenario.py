@@ -371,3 +371,10 @@ def test_everything_that_is_wrong_is_told_at_once() -> None:
     with pytest.raises(ScenarioError) as caught:
         resolve(load("containment", settings=["rates.exchange_rate=30", "record_rate=70", "faults.0.uav=8"]))
     assert len(caught.value.problems) == 3
+
+
+def test_a_fault_must_leave_a_trim_at_the_speeds_that_leaders_change_to() -> None:
+    """Chapter 4: UAV 2 could not hold 30 m/s without d2, but flies at 40 m/s when its elevator fails; d2 acts later."""
+    assert not any("trim" in text for text in resolve(load("nearest_neighbour")).warnings)
+    with pytest.raises(ScenarioError, match=r"UAV 2 no level trim at 30 m/s and t = 160 s.*-1\.015 rad"):
+        resolve(load("nearest_neighbour", settings=["disturbances=[]"]))

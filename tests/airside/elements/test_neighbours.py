@@ -40,14 +40,20 @@ def test_a_neighbour_never_heard_counts_as_at_rest_or_not_at_all():
 
 def test_nearest_neighbours_are_averaged_and_stale_ones_left_out():
     """(4.10), (4.11); the third record is 3 s old."""
-    value, rate, weights = weighted_average(heard(), 2, 2.0)
+    value, rate, weights = weighted_average(heard(), 2, 2.0, 2.0)
     assert weights == pytest.approx(0.9)
     assert value == pytest.approx((0.4 * (200.0 - 2.0 * 0.05) + 0.5 * 210.0) / 0.9)
     assert rate == pytest.approx(0.4 * -2.0 / 0.9)
 
 
+def test_averaged_neighbours_may_be_held_instead_of_carried_on():
+    value, rate, _ = weighted_average(heard(), 2, 2.0, 0.0)
+    assert value == pytest.approx((0.4 * 200.0 + 0.5 * 210.0) / 0.9)
+    assert rate == pytest.approx(0.4 * -2.0 / 0.9)
+
+
 def test_nobody_left_is_no_average():
-    assert weighted_average(heard((0.0, 0.0, 1.0)), 0, 2.0) == (0.0, 0.0, 0.0)
+    assert weighted_average(heard((0.0, 0.0, 1.0)), 0, 2.0, 2.0) == (0.0, 0.0, 0.0)
 
 
 def test_motion_sums_give_the_disagreement_at_any_later_time():

@@ -6,8 +6,12 @@ import math
 
 import pytest
 
+from ftcc.airside.autopilots import build
 from ftcc.airside.model import airspeed_model
 from ftcc.airside.schemes import find
+from ftcc.groundside.mission import resolve
+from ftcc.groundside.scenario import load
+from ftcc.link.channel import hear
 from ftcc.link.graph import Graph
 from tests.airside.schemes.flying import MISSION, both_ways, flight, heard, model, own
 
@@ -64,7 +68,7 @@ def test_at_the_start_the_filters_stand_at_what_they_filter(form, uav):
     assert (law.gamma_d_rate, law.theta_d_rate) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert law.d1_hat == pytest.approx(gains.k11 * law.S1)
     assert law.lumped_hat == pytest.approx(gains.k51 * aircraft.q)
-    assert after.begun == 2.0
+    assert after.begun == 1.0
 
 
 def test_initial_pitch_estimate_of_uav_4_is_inside_the_monographs_figure():
@@ -72,17 +76,20 @@ def test_initial_pitch_estimate_of_uav_4_is_inside_the_monographs_figure():
     assert begin("monograph", own(**AT_START[4]), HEARD_AT_START[4])[2].lumped_hat == pytest.approx(23.3)
 
 
-def test_before_the_first_record_the_mission_tells_what_the_neighbours_do():
-    aircraft = own(**AT_START[2])
-    gains, after, law = begin("flight", aircraft, heard(), V_start=30.75, z_start=999.0, z_rate_start=6.0)
-    assert (law.V_id, law.z_id) == (30.75, 999.0)
-    after, law = LAW.step(after, aircraft, heard(), MISSION, MODEL, gains, 0.005)
-    assert law.z_id == pytest.approx(999.03)
-    assert after.begun == 1.0
+def test_before_the_first_record_the_neighbours_are_known_as_they_start():
+    """The spec that an autopilot is given holds its neighbours' V, V' = 0, z, z' of t = 0; leaders count likewise."""
+    mission = resolve(load("nearest_neighbour"))
+    _, inbox = build(mission.autopilots, mission.timing)
+    assert inbox.valid[:4].sum() == sum(len(HEARD_AT_START[uav].age) for uav in HEARD_AT_START)
+    for i, spec in enumerate(mission.autopilots[:4]):
+        known = {n.uav: inbox.values[i, edge].tolist() for edge, n in enumerate(spec.neighbours)}
+        assert known == {n.uav: pytest.approx(LEADER if n.uav == 5 else said(n.uav)) for n in spec.neighbours}
+    hear(inbox, 0, 30_000)
+    assert inbox.age[0, : inbox.degree[0]].tolist() == [0.03] * 3
 
 
-def test_engaged_in_flight_without_neighbours_the_aircraft_flies_on():
-    _, _, law = begin("flight", own(V=27.0, z=940.0), heard(), in_flight=1.0)
+def test_who_knows_of_no_neighbour_flies_on():
+    _, _, law = begin("flight", own(V=27.0, z=940.0), heard())
     assert (law.S1, law.S2) == (0.0, 0.0)
 
 
@@ -150,6 +157,8 @@ def test_flight_form_passes_with_a_word_on_condition_4_63():
         ({"k21": -1.0}, 0.005, "gain k21 = -1: must be > 0"),
         ({}, 0.025, "gain k51, k52: its rate 86 1/s is unstable in Euler steps of 25 ms"),
         ({"oldest": 0.08}, 0.005, "exchange period plus the latency"),
+        ({"horizon": -1.0}, 0.005, "gain horizon = -1: must be >= 0"),
+        ({"gamma_limit": -0.3}, 0.005, "gain gamma_limit = -0.3: must be >= 0"),
     ],
 )
 def test_gains_that_break_a_condition_are_refused(gains, period, words):

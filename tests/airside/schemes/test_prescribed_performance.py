@@ -141,6 +141,8 @@ def test_start_outside_of_the_tube_is_refused():
         ({"tube_last": 3.0}, {}, "must not widen"),
         ({}, {"leader_speed_varies": True}, "must be constant"),
         ({"phi": 0.01}, {}, "unstable in Euler steps"),
+        ({"horizon": -5.0}, {}, "gain horizon = -5: must be >= 0"),
+        ({"cap": -0.5}, {}, "gain cap = -0.5: must be >= 0"),
     ],
 )
 def test_gains_that_break_a_condition_are_refused(gains, facts, words):
