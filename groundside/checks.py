@@ -216,7 +216,7 @@ def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[
         elif given or getattr(plan.plant.lag, name) > 0.0 or getattr(plan.plant.rate_limits, name) < math.inf:
             findings.refuse(f"plant: has no {name}; its actuators are {', '.join(actuators)}")
     for n, fault in enumerate(plan.faults):
-        if fault.actuator not in actuators:
+        if fault.actuator is not None and fault.actuator not in actuators:
             findings.refuse(
                 f"faults.{n}.actuator = {fault.actuator!r}: the plant has no such actuator; "
                 f"it has {', '.join(actuators)}"
@@ -397,6 +397,9 @@ def check_faults(
     changes = {command.at for p in profiles.values() for command in p.commands}
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
+        if fault.actuator is None or fault.kind not in ("wrong", "off"):
+            continue
+        remaining = 0.0 if fault.kind == "off" else fault.effectiveness
         vehicle = by_uav[fault.uav]
         own = _speed(plan, fault.uav)
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
@@ -411,14 +414,14 @@ def check_faults(
             }
             steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
             needed = steady.get(fault.actuator, 0.0)
-            command = (needed - fault.bias) / fault.effectiveness if fault.effectiveness > 0.0 else math.inf
-            if low < command < high or (fault.effectiveness == 0.0 and needed == fault.bias):
+            command = (needed - fault.bias) / remaining if remaining > 0.0 else math.inf
+            if low < command < high or (remaining == 0.0 and needed == fault.bias):
                 continue
             unit = unit_of(fault.actuator)
             text = (
-                f"faults.{n} (effectiveness {fault.effectiveness:g}, bias {fault.bias:g} {unit}): leaves "
+                f"faults.{n} (effectiveness {remaining:g}, bias {fault.bias:g} {unit}): leaves "
                 f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need the command "
-                f"({needed:.3f} - {fault.bias:g})/{fault.effectiveness:g} = {command:.3f} {unit}; "
+                f"({needed:.3f} - {fault.bias:g})/{remaining:g} = {command:.3f} {unit}; "
                 f"allowed is {low:g} to {high:g}"
             )
             if fault.without_trim:

@@ -16,6 +16,7 @@ from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
 from ftcc.link.channel import admit, hear, report_link
 from ftcc.link.compiled import compiled, copy, fill
+from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import DIVERGED, X, Z, latch
 from ftcc.sim.sensors import encode_state
@@ -202,6 +203,7 @@ def fly(
             _measure(fleet, i, n, seed, true[i], seen)
             if wire:
                 encode_state(seen, message)
+                navigate(fleet, i, now / 1e6, message)
                 # The vehicle reports the command in force as it received it.
                 encode_command(fleet.command[i], fleet.travel[i], buffer)
                 sense(autopilots, i, message, buffer, now)

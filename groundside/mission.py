@@ -30,6 +30,7 @@ from ftcc.groundside.checks import (
     timing_of,
 )
 from ftcc.groundside.claims import check_claims
+from ftcc.groundside.faults import actuator_faults, fault_text, navigation_faults
 from ftcc.groundside.fire import check_posts
 from ftcc.groundside.leaders import profiles_of
 from ftcc.groundside.links import link_changes, link_texts
@@ -38,14 +39,14 @@ from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, RateLimits
 from ftcc.groundside.schema_fire import PointMassSheet
-from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, SLOT, THRUST, in_slots, unit_of
+from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
 from ftcc.sim.airframe import scaled
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Guards, Gust
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Guards, Gust
 from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
 
 __all__ = ["Mission", "resolve"]
@@ -262,18 +263,8 @@ def _aircraft(
         delay=plan.plant.delay,
         gust=_gust(plan, channels, findings),
         fault_before_lag=plan.plant.fault == "before_lag",
-        faults=tuple(
-            Fault(
-                f.at,
-                float(SLOT[f.actuator]),
-                f.effectiveness,
-                f.bias,
-                f.effectiveness_onset,
-                f.bias_onset,
-            )
-            for f in sorted(plan.faults, key=lambda f: f.at)
-            if f.uav == uav
-        ),
+        faults=actuator_faults(plan, uav),
+        navigation_faults=navigation_faults(plan, uav),
         disturbances=tuple(
             Disturbance(d.at, float(channels.index(name)), value, d.onset)
             for d in sorted(plan.disturbances, key=lambda d: d.at)
@@ -338,11 +329,7 @@ def _reference_point(
 def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str], ...]:
     events: list[tuple[float, int | None, str]] = []
     for fault in plan.faults:
-        unit = unit_of(fault.actuator)
-        text = f"{fault.actuator} fault: effectiveness {fault.effectiveness:g}, bias {fault.bias:g} {unit}"
-        if fault.effectiveness == 1.0 and fault.bias == 0.0:
-            text = f"{fault.actuator} repaired"
-        events.append((fault.at, fault.uav, text))
+        events.append((fault.at, fault.uav, fault_text(fault)))
     for disturbance in plan.disturbances:
         units = dict(plant.DISTURBANCES)
         text = "disturbance " + ", ".join(f"{name} = {v:g} {units[name]}" for name, v in disturbance.values.items())

@@ -407,16 +407,50 @@ class DisturbanceFields(Strict):
 
 
 class FaultFields(Strict):
-    """From ``at`` on an actuator acts as effectiveness * position + bias."""
+    """From ``at`` on an ``actuator``, or the ``navigation`` solution, fails, until another fault of it.
+
+    Actuators: wrong: effectiveness * position + bias; off: effectiveness 0; stuck: holds its deflection; slow: moves at
+    ``slew`` at most; intermittent: healthy for a share of each period, else as wrong. Navigation: wrong: with an
+    offset; off: dead reckoning, or attitude held and rates zero; stuck: held; slow: fresh once in a period;
+    intermittent: fresh for a share of each period. ok: repaired.
+    """
 
     at: float = Field(ge=0.0, description="s")
     uav: Id
-    actuator: Actuator
+    actuator: Actuator | None = None
+    navigation: Literal["position", "attitude"] | None = None
+    kind: Literal["wrong", "off", "stuck", "slow", "intermittent", "ok"] = "wrong"
     effectiveness: Probability = 1.0
     bias: float = Field(0.0, description="rad or N")
     effectiveness_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
     bias_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
+    slew: float | None = Field(None, gt=0.0, description="rad/s or N/s, largest rate of a slow actuator")
+    period: float | None = Field(None, gt=0.0, description="s, of intermittent faults and of slow navigation")
+    duty: Probability | None = Field(None, description="healthy share of the period")
+    offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m; roll, pitch, yaw, rad")
+    rate_offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m/s; p, q, r, rad/s")
     without_trim: bool = Field(False, description="true: fly it although it leaves no level trim")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.actuator is None) == (self.navigation is None):
+            raise ValueError("needs either actuator or navigation")
+        given = {
+            name for name in type(self).model_fields if getattr(self, name) != type(self).model_fields[name].default
+        }
+        needed = {
+            "slow": {"slew"} if self.actuator else {"period"},
+            "intermittent": {"period", "duty"},
+        }.get(self.kind, set())
+        if needed - given:
+            raise ValueError(f"kind = {self.kind!r} needs {', '.join(sorted(needed - given))}")
+        lossy = {"effectiveness", "bias", "effectiveness_onset", "bias_onset"}
+        sizes = {"wrong": lossy, "intermittent": lossy} if self.actuator else {"wrong": {"offset", "rate_offset"}}
+        extra = given - needed - sizes.get(self.kind, set())
+        extra -= {"at", "uav", "actuator", "navigation", "kind", "without_trim"}
+        if extra:
+            raise ValueError(f"kind = {self.kind!r} takes no {', '.join(sorted(extra))}")
+        return self
 
 
 class HomeFields(Strict):

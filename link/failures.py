@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ftcc.link.mavlink import SIMULATOR, as_typed, dialect, float_array
+from ftcc.link.mavlink import AUTOPILOT, SIMULATOR, as_typed, dialect, float_array
 
 __all__ = [
     "AIRFRAME_SIZES",
@@ -24,6 +24,7 @@ __all__ = [
     "Meaning",
     "Size",
     "Unit",
+    "failure_answer",
     "failure_messages",
     "meaning_of",
     "read_failure",
@@ -253,3 +254,9 @@ def read_failure(messages: Sequence[Any]) -> tuple[Failure | None, int]:
     names = [size.name for size in AIRFRAME_SIZES]
     sizes = dict(zip(names, map(as_typed, told.data), strict=False))
     return Failure(meaning, int(command.param3), sizes), int(told.time_usec)
+
+
+def failure_answer(uav: int, result: int, at_us: int) -> Any:
+    """COMMAND_ACK of a vehicle to its autopilot, with the simulated time at which the failure acts, in ms."""
+    command = dialect.MAV_CMD_INJECT_FAILURE
+    return dialect.MAVLink_command_ack_message(command, result, 0, at_us // 1000, uav, AUTOPILOT)

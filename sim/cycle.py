@@ -11,6 +11,7 @@ from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, moved
+from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
@@ -135,7 +136,7 @@ def conditions(fleet, i, time, out):
     """Write what is wrong with vehicle ``i`` at ``time`` (s) into ``out``, in the order of `plants.conditions_of`."""
     count = len(_SLOTS)
     for n, slot in enumerate(_SLOTS):
-        out[n], out[count + n] = fault(fleet, i, slot, time)
+        out[n], out[count + n], _ = fault(fleet, i, slot, time)
     for channel in range(_CHANNELS):
         out[2 * count + channel] = disturbance(fleet, i, channel, time)
 
@@ -157,6 +158,7 @@ def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, control
             watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[i, X], true[i, Z])
             measure(fleet, i, tick, seed, true[i], seen)
             encode_state(seen, messages[i])
+            navigate(fleet, i, now_us / 1e6, messages[i])
             encode_command(fleet.command[i], fleet.travel[i], controls[i])
 
 

@@ -19,9 +19,12 @@ from ftcc.link.philox import GUST, gaussian_pair, philox
 
 __all__ = [
     "DIVERGED",
+    "INTERMITTENT",
     "LOST",
+    "STUCK",
     "TRUTH",
     "UNITS",
+    "WRONG",
     "Autothrottle",
     "Disturbance",
     "Fault",
@@ -75,8 +78,15 @@ class Guards(NamedTuple):
     """rad."""
 
 
+WRONG, STUCK, INTERMITTENT = range(3)
+"""Kinds of `Fault`."""
+
+
 class Fault(NamedTuple):
-    """Columns of ``Fleet.faults``: from ``time`` on, the actuator acts as effectiveness * position + bias."""
+    """Columns of ``Fleet.faults``: from ``time`` on, the actuator acts as effectiveness * position + bias.
+
+    Stuck it holds the deflection that it has; intermittent it is healthy for a share of each period.
+    """
 
     time: float
     """s."""
@@ -89,6 +99,13 @@ class Fault(NamedTuple):
     """Rate of the exponential onset of the loss, 1/s; 0 = step."""
     bias_onset: float
     """Rate of the exponential onset of the bias, 1/s; 0 = step."""
+    kind: float = WRONG
+    slew: float = math.inf
+    """Fastest motion, rad/s or N/s; inf = as ever."""
+    period: float = 1.0
+    """Of an intermittent fault, s."""
+    duty: float = 1.0
+    """Its healthy share."""
 
 
 class Disturbance(NamedTuple):
@@ -151,7 +168,25 @@ class Fleet(NamedTuple):
     fault_before_lag: NDArray[np.float64]
     """(k,): 1 where a fault acts at the input of the lag, 0 where it acts on the position behind it."""
     faults: NDArray[np.float64]
-    """(k, n, 6): see `Fault`, in order of time; unused rows have time inf."""
+    """(k, n, 10): see `Fault`, in order of time; unused rows have time inf."""
+    fault_count: NDArray[np.int64]
+    """(k,): rows in use."""
+    deflection: NDArray[np.float64]
+    """(k, 4): what acted last."""
+    held: NDArray[np.float64]
+    """(k, 4): what a stuck actuator holds."""
+    held_since: NDArray[np.float64]
+    """(k, 4): time of the fault by which it is stuck, s; inf = it is not."""
+    navigation: NDArray[np.float64]
+    """(k, n, 11): see ``navigation.NavigationFault``, in order of time; unused rows have time inf."""
+    navigation_count: NDArray[np.int64]
+    """(k,): rows in use."""
+    solution: NDArray[np.float64]
+    """(k, 13): the last fresh navigation solution, as its messages carry it."""
+    fresh: NDArray[np.float64]
+    """(k, 2): time of the last fresh position and attitude, s; -1 = there was none."""
+    updates: NDArray[np.int64]
+    """(k, 2): updates of a slow solution that are past."""
     disturbances: NDArray[np.float64]
     """(k, n, 4): see `Disturbance`; unused rows have time inf."""
     gust_deviation: NDArray[np.float64]
@@ -195,15 +230,27 @@ def _onset(since: float, rate: float) -> float:
 
 @compiled
 def fault(fleet, i, actuator, time):
-    """Effectiveness and bias of an actuator: those of its latest fault."""
-    effectiveness = 1.0
-    bias = 0.0
-    for n in range(fleet.faults.shape[1]):
-        since = time - fleet.faults[i, n, 0]
-        if since >= 0.0 and int(fleet.faults[i, n, 1]) == actuator:
-            effectiveness = 1.0 + (fleet.faults[i, n, 2] - 1.0) * _onset(since, fleet.faults[i, n, 4])
-            bias = fleet.faults[i, n, 3] * _onset(since, fleet.faults[i, n, 5])
-    return effectiveness, bias
+    """Effectiveness, bias and largest rate of an actuator: those of its latest fault."""
+    latest = -1
+    for n in range(fleet.fault_count[i]):
+        if time - fleet.faults[i, n, 0] >= 0.0 and int(fleet.faults[i, n, 1]) == actuator:
+            latest = n
+    if latest < 0:
+        return 1.0, 0.0, fleet.rate[i, actuator]
+    row = fleet.faults[i, latest]
+    since = time - row[0]
+    kind = int(row[6])
+    if kind == STUCK:
+        if fleet.held_since[i, actuator] != row[0]:
+            fleet.held_since[i, actuator] = row[0]
+            fleet.held[i, actuator] = fleet.deflection[i, actuator]
+        return 0.0, fleet.held[i, actuator], fleet.rate[i, actuator]
+    fleet.held_since[i, actuator] = math.inf
+    if kind == INTERMITTENT and since % row[8] < row[9] * row[8]:
+        return 1.0, 0.0, fleet.rate[i, actuator]
+    effectiveness = 1.0 + (row[2] - 1.0) * _onset(since, row[4])
+    bias = row[3] * _onset(since, row[5])
+    return effectiveness, bias, min(fleet.rate[i, actuator], row[7])
 
 
 @compiled
@@ -265,20 +312,21 @@ def hold_speed(fleet, i, airspeed):
 
 
 @compiled
-def _immediate(fleet, i, actuator):
-    return fleet.lag[i, actuator] == 0.0 and fleet.rate[i, actuator] == math.inf
+def _immediate(fleet, i, actuator, rate):
+    return fleet.lag[i, actuator] == 0.0 and rate == math.inf
 
 
 @compiled
 def actuate(fleet, i, time):
     """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force."""
     for actuator in range(4):
-        effectiveness, bias = fault(fleet, i, actuator, time)
-        if _immediate(fleet, i, actuator):
+        effectiveness, bias, rate = fault(fleet, i, actuator, time)
+        if _immediate(fleet, i, actuator, rate):
             fleet.position[i, actuator] = _saturated(fleet, i, actuator)
         elif fleet.fault_before_lag[i] > 0.0:
             effectiveness, bias = 1.0, 0.0
         fleet.acting[i, actuator] = effectiveness * fleet.position[i, actuator] + bias
+        fleet.deflection[i, actuator] = fleet.acting[i, actuator]
 
 
 @compiled
@@ -312,24 +360,25 @@ def stroke(fleet, i, actuator, time, step):
 
     A fault is taken at ``time`` (s), the middle of the step.
     """
-    effectiveness, bias = fault(fleet, i, actuator, time)
+    effectiveness, bias, rate = fault(fleet, i, actuator, time)
     target = _saturated(fleet, i, actuator)
     before = fleet.position[i, actuator]
-    if _immediate(fleet, i, actuator):
+    if _immediate(fleet, i, actuator, rate):
         fleet.position[i, actuator] = target
         deflection = effectiveness * target + bias
+        fleet.deflection[i, actuator] = deflection
         return deflection, deflection, deflection
     if fleet.fault_before_lag[i] > 0.0:
         target = effectiveness * target + bias
         effectiveness, bias = 1.0, 0.0
-    lag, rate = fleet.lag[i, actuator], fleet.rate[i, actuator]
-    if fleet.damping[i, actuator] > 0.0:
+    lag = fleet.lag[i, actuator]
+    if fleet.damping[i, actuator] > 0.0 and rate >= fleet.rate[i, actuator]:
         speed, damping = fleet.speed[i, actuator], fleet.damping[i, actuator]
         middle, _ = _swung(before, speed, target, lag, damping, 0.5 * step)
         after, fleet.speed[i, actuator] = _swung(before, speed, target, lag, damping, step)
-        fleet.position[i, actuator] = after
-        return effectiveness * before + bias, effectiveness * middle + bias, effectiveness * after + bias
-    middle = _moved(before, target, lag, rate, 0.5 * step)
-    after = _moved(before, target, lag, rate, step)
+    else:
+        middle = _moved(before, target, lag, rate, 0.5 * step)
+        after = _moved(before, target, lag, rate, step)
     fleet.position[i, actuator] = after
-    return effectiveness * before + bias, effectiveness * middle + bias, effectiveness * after + bias
+    fleet.deflection[i, actuator] = effectiveness * after + bias
+    return effectiveness * before + bias, effectiveness * middle + bias, fleet.deflection[i, actuator]

@@ -15,12 +15,14 @@ from types import ModuleType
 import numpy as np
 
 from ftcc.link.actuators import decode_command, in_slots, unit_of
+from ftcc.link.failures import Failure, failure_answer, read_failure
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
 from ftcc.link.happenings import drained
 from ftcc.link.mavlink import (
     LOOPBACK,
     SIMULATOR,
     Endpoint,
+    dialect,
     ending_message,
     ends,
     float_array,
@@ -30,6 +32,7 @@ from ftcc.link.mavlink import (
 )
 from ftcc.link.process import RESEND, Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, PartWriter
+from ftcc.sim.failures import faults_of, inject
 from ftcc.sim.obstacles import clearance, entered_text
 from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS, Fleet, X, Z, latch
 from ftcc.sim.plants import conditions_of, cycle_of, find
@@ -201,9 +204,14 @@ class Vehicles:
     def listen(self, i: int) -> None:
         """Take in what the autopilot of vehicle ``i`` sent; the newest command counts."""
         pilot = self.pilots[i]
-        for message in pilot.receive(self.setting.datagrams):
+        messages = pilot.receive(self.setting.datagrams)
+        for n, message in enumerate(messages):
             if ends(message):
                 self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
+                continue
+            failure, at_us = read_failure(messages[n : n + 2])
+            if failure is not None:
+                self.fail(i, failure, at_us)
                 continue
             if self.specs[i].kind == "reference_point":
                 stamp = read_target(message, self.targets[i])
@@ -213,6 +221,20 @@ class Vehicles:
                 pilot.send_again()
             elif stamp >= 0:
                 self.answered[i] = max(self.answered[i], stamp)
+
+    def fail(self, i: int, failure: Failure, at_us: int) -> None:
+        """Arm a failure, at a simulated time or (0) at once, and answer the autopilot."""
+        at_us = at_us or self.now_us
+        faults = faults_of(self.fleet, i, failure, at_us / 1e6)
+        if not faults:
+            result = dialect.MAV_RESULT_UNSUPPORTED
+        elif at_us < self.now_us or not self.alive[i]:
+            result = dialect.MAV_RESULT_DENIED
+        elif all(inject(self.fleet, i, fault, self.now_us / 1e6) for fault in faults):
+            result = dialect.MAV_RESULT_ACCEPTED
+        else:
+            result = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        self.pilots[i].send_aside(failure_answer(self.specs[i].uav, result, at_us))
 
     def latch(self) -> None:
         """Bring the newest commands into force; one that does not answer the last state is late."""

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.happenings import new_happenings
+from ftcc.sim.failures import SPARE, inject
+from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.obstacles import Obstacle, zones_of
 from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards, Gust
 from ftcc.sim.plants import find
@@ -59,6 +61,7 @@ class VehicleSpec:
     gust: Gust = CALM
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
+    navigation_faults: tuple[NavigationFault, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     """The same for all vehicles."""
 
@@ -77,13 +80,20 @@ def _padded(rows: Sequence[Sequence[tuple[float, ...]]], width: int) -> NDArray[
     return table
 
 
+def _free(specs: Sequence[VehicleSpec], name: str, width: int) -> NDArray[np.float64]:
+    """An empty table of failures with room for the planned ones and `SPARE` others."""
+    table = np.zeros((len(specs), SPARE + max(len(getattr(spec, name)) for spec in specs), width))
+    table[:, :, 0] = math.inf
+    return table
+
+
 def build(specs: Sequence[VehicleSpec]) -> Fleet:
     """Arrays for ``specs``, which share one plant, before the first tick."""
     k = len(specs)
     plant = find(specs[0].plant)
     command = np.array([spec.command for spec in specs], np.float64)
     limits = np.array([spec.limits for spec in specs], np.float64)
-    return Fleet(
+    fleet = Fleet(
         state=np.array([spec.initial for spec in specs], np.float64),
         position=np.clip(command, limits[:, :, 0], limits[:, :, 1]),
         command=command,
@@ -99,7 +109,16 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
-        faults=_padded([spec.faults for spec in specs], len(Fault._fields)),
+        faults=_free(specs, "faults", len(Fault._fields)),
+        fault_count=np.zeros(k, np.int64),
+        deflection=np.clip(command, limits[:, :, 0], limits[:, :, 1]),
+        held=np.zeros((k, len(ACTUATORS))),
+        held_since=np.full((k, len(ACTUATORS)), math.inf),
+        navigation=_free(specs, "navigation_faults", len(NavigationFault._fields)),
+        navigation_count=np.zeros(k, np.int64),
+        solution=np.zeros((k, 13)),
+        fresh=np.full((k, 2), -1.0),
+        updates=np.zeros((k, 2), np.int64),
         disturbances=_padded([spec.disturbances for spec in specs], len(Disturbance._fields)),
         guards=np.array([spec.guards for spec in specs], np.float64),
         airframe=np.array([spec.airframe for spec in specs], np.float64),
@@ -115,3 +134,8 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         autothrottle=np.array([(*spec.autothrottle, spec.autothrottle.thrust) for spec in specs], np.float64),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
     )
+    for i, spec in enumerate(specs):
+        planned: list[Fault | NavigationFault] = [*spec.faults, *spec.navigation_faults]
+        for fault in sorted(planned, key=lambda fault: fault.time):
+            inject(fleet, i, fault, -math.inf)
+    return fleet
