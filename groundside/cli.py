@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside import cli_fly, cli_study
+from ftcc.groundside import cli_fly, cli_ground, cli_study
 from ftcc.groundside.cli_common import (
     Duration,
     Form,
@@ -235,6 +235,7 @@ def compare(
 
 
 cli_fly.register(app)
+cli_ground.register(app)
 cli_study.register(app)
 
 

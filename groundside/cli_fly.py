@@ -1,4 +1,4 @@
-"""The commands that deal with running swarms: fly, ps, stop, resume, doctor."""
+"""The commands that deal with running swarms: fly, ps, stop, doctor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import typer
 from rich.console import Console
@@ -28,6 +28,9 @@ from ftcc.groundside.cli_common import (
     show_claims,
 )
 
+if TYPE_CHECKING:
+    from ftcc.link.ground import Address
+
 __all__ = ["register"]
 
 console = Console()
@@ -39,7 +42,7 @@ _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 
 def register(app: typer.Typer) -> None:
     """Add the commands to ``app``."""
-    for command in (fly, ps, stop, resume, doctor):
+    for command in (fly, ps, stop, doctor):
         app.command()(command)
 
 
@@ -66,6 +69,33 @@ def _pack(text: str, uavs: int) -> int:
     return int(text)
 
 
+def _listeners(given: list[str] | None) -> tuple[Address, ...]:
+    """Addresses of ground stations."""
+    from ftcc.link.ground import LISTENERS
+
+    if given is None:
+        return LISTENERS
+    found = []
+    for text in given:
+        host, _, port = text.rpartition(":")
+        if text == "none":
+            continue
+        if not host or not port.isdigit() or not 0 < int(port) < 65536:
+            fail(f"--mavlink {text}: must be HOST:PORT, such as 127.0.0.1:14550, or none")
+        found.append((host, int(port)))
+    return tuple(found)
+
+
+def _check_key(key: Path | None) -> None:
+    from ftcc.link.signing import KeyFileError, read_key
+
+    try:
+        if key is not None:
+            read_key(key)
+    except KeyFileError as error:
+        fail(f"--key {error}")
+
+
 def fly(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario or the path of a TOML file.")] = "demo",
     form: Form = None,
@@ -80,6 +110,11 @@ def fly(
     browser: Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")] = True,
     pack: Annotated[str, typer.Option(help="Vehicles per process, or 'auto'.")] = "1",
     port: Annotated[int | None, typer.Option(help="First port of the swarm's block; default: a free one.")] = None,
+    mavlink: Annotated[
+        list[str] | None,
+        typer.Option(metavar="HOST:PORT", help="Where a ground station listens, or none; default: 14550, 14540."),
+    ] = None,
+    key: Annotated[Path | None, typer.Option(help="Key file: sign the links to the ground, see `ftcc keys`.")] = None,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
     from ftcc.groundside.fly import Viewer
@@ -91,6 +126,8 @@ def fly(
     if not mission.wire:
         fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
     count = _pack(pack, len(mission.vehicles))
+    listeners = _listeners(mavlink)
+    _check_key(key)
     folder = new_run_folder(mission, out)
 
     from ftcc.groundside.fly import FlightOptions
@@ -103,7 +140,17 @@ def fly(
     except PortError as error:
         folder.rmdir()
         fail(str(error))
-    options = FlightOptions(folder, factor is None, factor or 1.0, count, hold, cast(Viewer, viewer), browser)
+    options = FlightOptions(
+        folder=folder,
+        lockstep=factor is None,
+        speed=factor or 1.0,
+        pack=count,
+        held=hold,
+        viewer=cast(Viewer, viewer),
+        open_browser=browser,
+        listeners=listeners,
+        key=key,
+    )
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"), console=console
     )
@@ -160,7 +207,7 @@ def ps() -> None:
         table.add_row(
             entry.name,
             entry.scenario,
-            str(entry.uavs),
+            str(len(entry.vehicles)),
             str(entry.pid),
             f"{entry.ports[0]}-{entry.ports[1]}",
             time.strftime("%H:%M:%S", time.localtime(entry.started)),
@@ -191,11 +238,6 @@ def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="
     names: list[str | None] = [entry.name for entry in running()] if every else [name]
     for one in names:
         _tell(one, "stop")
-
-
-def resume(name: _Name = None) -> None:
-    """Let a swarm that was started with --hold fly."""
-    _tell(name, "resume")
 
 
 _MS_PER_TICK = 0.95

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.launcher import Outcome, Swarm
 from ftcc.groundside.monitor import Monitor
-from ftcc.groundside.registry import Control, Entry
+from ftcc.groundside.registry import Card, Control, Entry
 from ftcc.groundside.snapshot import Event
 from ftcc.link.actuators import in_slots
 from ftcc.link.ground import LISTENERS, Address
@@ -149,7 +149,7 @@ def fly(
         try:
             flight.dashboard = _dashboard(mission, options, ports)
             address = flight.dashboard.address if flight.dashboard else None
-            control = Control(_entry(mission, folder, ports, address), lambda what, how: _obey(swarm, what))
+            control = Control(_entry(mission, options, ports, address), lambda what, how: _obey(flight, what, how))
             _loop(flight, lambda: swarm.ready, control, _FIRST_START, lambda t: None)
             started(address)
             swarm.go()
@@ -205,23 +205,51 @@ def _loop(
         flight.refresh(progress)
 
 
-def _obey(swarm: Swarm, command: str) -> None:
-    """A command from the control socket."""
-    if command == "stop":
-        swarm.stop()
-    elif command == "resume":
-        swarm.resume()
-    else:
-        raise ValueError(f"unknown command {command!r}; known: stop, resume")
+def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
+    """A command from the control socket.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong with it.
+    """
+    flow, text = flight.swarm.flow, ""
+    match command:
+        case "status":
+            t = flow.tick * flow.period if flow.state == "held" else flight.station.t
+            return {"state": flow.state, "t": t, "speed": None if flow.lockstep else flow.speed}
+        case "stop":
+            flight.swarm.stop()
+        case "pause":
+            flow.pause()
+            text = "paused"
+        case "step":
+            flow.step(max(1, int(arguments["ticks"])))
+        case "resume":
+            flow.resume()
+            text = "resumed"
+        case "speed":
+            flow.set_speed(float(arguments["factor"]))
+            text = f"speed {flow.speed:g}"
+        case _:
+            raise ValueError(f"unknown command {command!r}")
+    if text:
+        flight.note(Event(-1.0, "info", text, who="command line", outcome="accepted"))
+    return None
 
 
-def _entry(mission: Mission, folder: Path, ports: PortBlock, address: str | None) -> Entry:
+def _entry(mission: Mission, options: FlightOptions, ports: PortBlock, address: str | None) -> Entry:
+    folder = options.folder
     return Entry(
         name=folder.name,
         pid=os.getpid(),
         scenario=mission.name,
         folder=str(folder.resolve()),
-        uavs=len(mission.vehicles),
+        vehicles=tuple(
+            Card(spec.uav, spec.role, ports.of(spec.uav).ground, tuple(n.uav for n in spec.neighbours))
+            for spec in mission.autopilots
+        ),
+        key=None if options.key is None else str(options.key.resolve()),
         ports=(ports.base, ports.base + ports.size - 1),
         viewer=address,
         started=time.time(),

@@ -20,8 +20,9 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ftcc.groundside.flow import Flow
 from ftcc.groundside.snapshot import Event
-from ftcc.link.gate import Ended, Go, Gone, Limit, Lost, Pace, Ready, Release, Said, Stop
+from ftcc.link.gate import Ended, Go, Gone, Held, Lost, Ready, Release, Said, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
 
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
 
-_START = 0.05
-"""Wall time between go and the first tick, s."""
 _END = 1.2
 """Wall time that processes have to end by themselves, s."""
 _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
@@ -135,12 +134,11 @@ class Swarm:
         self.mission = mission
         self.folder = folder
         self.lockstep = lockstep
-        self.speed = speed
-        self.held = held
         self.on_event = on_event
         self.outcome = Outcome()
         self.children: list[Child] = []
         self.stopping_since: float | None = None
+        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying)
         uavs = [spec.uav for spec in mission.vehicles]
         groups = [tuple(uavs[start : start + pack]) for start in range(0, len(uavs), pack)]
         self.setting = Setting(
@@ -198,25 +196,23 @@ class Swarm:
 
     def go(self) -> None:
         """Begin the flight: one epoch for all."""
-        message = Go(Pace(time.monotonic() + _START, 0, self.speed), Limit(-1 if self.held else None))
+        self.tell_all(Go(*self.flow.begin()))
+
+    def _flying(self) -> list[str]:
+        """Names of the vehicle processes that still fly."""
+        return [child.name for child in self.children if child.kind == "vehicle" and not (child.ended or child.dead)]
+
+    def tell_all(self, message: Any) -> None:
+        """Say something to every process."""
         for child in self.children:
             child.tell(message)
-
-    def resume(self) -> None:
-        """Let a held swarm fly."""
-        if self.held:
-            self.held = False
-            for child in self.children:
-                child.tell(Pace(time.monotonic() + _START, 0, self.speed))
-                child.tell(Limit(None))
 
     def stop(self) -> None:
         """End the flight now, in order."""
         if self.stopping_since is None:
             self.stopping_since = time.monotonic()
             self.outcome.stopped = not self.over
-            for child in self.children:
-                child.tell(Stop())
+            self.tell_all(Stop())
 
     def sources(self) -> list[Any]:
         """What to wait for: pipes and sentinels of the living."""
@@ -248,6 +244,8 @@ class Swarm:
                 if child.kind == "vehicle":
                     self.outcome.late += late
                     self.outcome.ticks += ticks
+            case Held(tick):
+                self.flow.held(child.name, tick)
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"aircraft lost: {reason}", uav))

@@ -121,6 +121,8 @@ def resolve(scenario: Scenario) -> Mission:
         check_faults(plan, plant, vehicles, profiles, findings)
     else:
         check_posts(plan, references, vehicles, model, findings)
+    if not wire and any(fault.navigation for fault in plan.faults):
+        findings.refuse(f"faults: form {scenario.form} measures without a navigation solution that could fail")
 
     gains = gains_of(scenario, scheme, findings)
     flight = None

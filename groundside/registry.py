@@ -13,7 +13,20 @@ from typing import Any
 
 from ftcc.link.ports import runtime_folder
 
-__all__ = ["Control", "Entry", "find", "running", "tell"]
+__all__ = ["Card", "Control", "Entry", "find", "running", "tell"]
+
+
+@dataclass(frozen=True)
+class Card:
+    """A UAV of a running swarm."""
+
+    uav: int
+    role: str
+    """"follower" or "leader"."""
+    port: int
+    """Where its autopilot hears whoever calls."""
+    hears: tuple[int, ...]
+    """By whose links it hears."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +37,9 @@ class Entry:
     pid: int
     scenario: str
     folder: str
-    uavs: int
+    vehicles: tuple[Card, ...]
+    key: str | None
+    """Key file, where its links to the ground are signed."""
     ports: tuple[int, int]
     """First and last port of its block."""
     viewer: str | None
@@ -56,7 +71,8 @@ def running() -> list[Entry]:
     for path in sorted(runtime_folder().glob("*.json")):
         try:
             data = json.loads(path.read_text())
-            entry = Entry(**{**data, "ports": tuple(data["ports"])})
+            cards = tuple(Card(**{**card, "hears": tuple(card["hears"])}) for card in data["vehicles"])
+            entry = Entry(**{**data, "vehicles": cards, "ports": tuple(data["ports"])})
         except (ValueError, TypeError, KeyError, FileNotFoundError):
             continue  # being written or removed at this very moment, or not ours
         if _alive(entry.pid):

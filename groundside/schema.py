@@ -435,9 +435,7 @@ class FaultFields(Strict):
     def _consistent(self) -> Self:
         if (self.actuator is None) == (self.navigation is None):
             raise ValueError("needs either actuator or navigation")
-        given = {
-            name for name in type(self).model_fields if getattr(self, name) != type(self).model_fields[name].default
-        }
+        given = self.model_fields_set
         needed = {
             "slow": {"slew"} if self.actuator else {"period"},
             "intermittent": {"period", "duty"},
@@ -446,8 +444,8 @@ class FaultFields(Strict):
             raise ValueError(f"kind = {self.kind!r} needs {', '.join(sorted(needed - given))}")
         lossy = {"effectiveness", "bias", "effectiveness_onset", "bias_onset"}
         sizes = {"wrong": lossy, "intermittent": lossy} if self.actuator else {"wrong": {"offset", "rate_offset"}}
-        extra = given - needed - sizes.get(self.kind, set())
-        extra -= {"at", "uav", "actuator", "navigation", "kind", "without_trim"}
+        always = {"at", "uav", "actuator", "navigation", "kind", "without_trim"}
+        extra = given - always - needed - sizes.get(self.kind, set())
         if extra:
             raise ValueError(f"kind = {self.kind!r} takes no {', '.join(sorted(extra))}")
         return self

@@ -31,6 +31,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
         self.own_signing = signing
         if signing is not None:
             self.signing.secret_key = signing.key
+            self.signing.link_id = signing.link
             self.signing.sign_outgoing = True
             self.signing.allow_unsigned_callback = lambda _, kind: kind in _UNSIGNED
 

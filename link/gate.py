@@ -16,6 +16,7 @@ __all__ = [
     "Gate",
     "Go",
     "Gone",
+    "Held",
     "LauncherGoneError",
     "Limit",
     "Lost",
@@ -85,6 +86,13 @@ class Limit:
 
 
 @dataclass(frozen=True)
+class Held:
+    """Vehicle -> launcher: stands before this tick, which the limit does not let it pass."""
+
+    tick: int
+
+
+@dataclass(frozen=True)
 class Go:
     """Launcher -> process: the flight begins."""
 
@@ -119,6 +127,8 @@ class Gate:
     gone: set[int] = field(default_factory=set)
     stopping: bool = False
     released: bool = False
+    _held: int | None = None
+    """The tick at which this process has said that it is held."""
 
     def fileno(self) -> int:
         """For ``select``."""
@@ -152,7 +162,7 @@ class Gate:
             case Pace():
                 self.pace = message
             case Limit(tick):
-                self.limit = tick
+                self.limit, self._held = tick, None
             case Gone(uav):
                 self.gone.add(uav)
             case Stop():
@@ -168,6 +178,12 @@ class Gate:
     def open(self, tick: int) -> bool:
         """Whether the swarm may pass this tick."""
         return self.limit is None or tick <= self.limit
+
+    def hold(self, tick: int) -> None:
+        """Say, once, that the limit holds this process before a tick."""
+        if self._held != tick:
+            self._held = tick
+            self.tell(Held(tick))
 
     def wait_until_go(self) -> None:
         """Block until the flight begins or is called off."""

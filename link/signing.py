@@ -87,10 +87,13 @@ class Signing:
     key : 32 bytes
     memory : Path, optional
         Where stamps are kept, so that a command that was heard before a restart is refused after it.
+    link : int
+        Which of the links of its system this is, 0..255: stamps rise on each of them.
     """
 
-    def __init__(self, key: bytes, memory: Path | None = None) -> None:
+    def __init__(self, key: bytes, memory: Path | None = None, link: int = 0) -> None:
         self.key = key
+        self.link = link
         self._memory = memory
         self._sent = 0
         self._heard: dict[Stream, int] = {}

@@ -173,6 +173,7 @@ class Vehicles:
             if self.gate.stopping:
                 return False
             if not self.gate.open(self.tick):
+                self.gate.hold(self.tick)
                 self.stall.progress()
                 self.waiter.wait(1.0)
             elif not self.setting.lockstep:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ftcc.airside.modes import HOLD, MISSION, OFFBOARD
 
-__all__ = ["NAMES", "custom_mode", "mode_of"]
+__all__ = ["NAMES", "code_of", "custom_mode", "mode_called", "mode_of"]
 
 NAMES = {MISSION: "mission", HOLD: "hold", OFFBOARD: "offboard"}
 
@@ -28,3 +28,14 @@ def mode_of(main: float, sub: float) -> int | None:
         if main == its_main and (sub == its_sub or its_main == 6):
             return mode
     return None
+
+
+def code_of(name: str) -> int | None:
+    """The custom mode of a mode by its name; None if there is no such mode."""
+    return next((custom_mode(mode) for mode, its_name in NAMES.items() if its_name == name), None)
+
+
+def mode_called(custom: int) -> str:
+    """The name of the mode that a HEARTBEAT tells."""
+    mode = mode_of(custom >> 16 & 0xFF, custom >> 24)
+    return "unknown" if mode is None else NAMES[mode]

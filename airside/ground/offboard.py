@@ -18,7 +18,7 @@ __all__ = ["Offboard"]
 
 _M = dialect
 _FRESH = 1.0
-"""Wall time for which a target keeps a UAV in offboard, s."""
+"""Wall time for which a target lets a UAV enter offboard, s."""
 
 
 class Offboard:
@@ -26,7 +26,7 @@ class Offboard:
 
     A leader takes altitude and speed (SET_POSITION_TARGET_LOCAL_NED). A follower takes an attitude
     (SET_ATTITUDE_TARGET) where the reference of its plant is one: the module then has ``command_from_ground``.
-    Without targets for a second of wall time offboard becomes hold.
+    Without targets for as long as COM_OF_LOSS_T says offboard becomes hold.
     """
 
     def __init__(self, link: GroundLink) -> None:
@@ -56,7 +56,8 @@ class Offboard:
     def attend(self) -> None:
         """Fall back where the targets have stopped."""
         seat = self._link.seat
-        if seat.autopilots.mode[seat.i] == OFFBOARD and not self.fresh():
+        silent = time.monotonic() - self._last
+        if seat.autopilots.mode[seat.i] == OFFBOARD and 0.0 < seat.patience < silent:
             set_mode(self._link, HOLD)
             self._link.text(_M.MAV_SEVERITY_WARNING, "no targets: offboard becomes hold")
             seat.note("no targets from the ground: offboard becomes hold", "warning")

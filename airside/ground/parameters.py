@@ -133,6 +133,14 @@ def _attribute(seat: Seat, name: str, parameter: str, low: float, high: float, m
 
 def _system(seat: Seat) -> Iterator[Parameter]:
     yield _attribute(seat, "failures_enabled", "SYS_FAILURE_EN", 0, 1, "1: failures may be injected")
+    yield Parameter(
+        "COM_OF_LOSS_T",
+        lambda: seat.patience,
+        lambda value: setattr(seat, "patience", value),
+        0.0,
+        60.0,
+        meaning="wall time without targets after which offboard becomes hold, s, 0: never",
+    )
     yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
 
 

@@ -1,0 +1,364 @@
+"""The commands to a running swarm: faults, links, parameters, leaders, the flow of time; keys of signed links."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ftcc.groundside.cli_common import fail, terminal, warn
+
+if TYPE_CHECKING:
+    from ftcc.groundside.station import Station
+
+__all__ = ["register"]
+
+_REFUSED = 1
+
+Swarm = Annotated[str | None, typer.Option("--swarm", help="Name of the swarm, see `ftcc ps`; needed if several run.")]
+Key = Annotated[Path | None, typer.Option("--key", help="Key file of signed links; default: that of the swarm.")]
+Uav = Annotated[int, typer.Argument(metavar="UAV", help="Id of a UAV.")]
+Other = Annotated[int | None, typer.Argument(metavar="[UAV]", help="The other end; without: all links of the UAV.")]
+At = Annotated[float | None, typer.Option(help="Simulated time at which it acts, s; default: at once.")]
+
+link = typer.Typer(no_args_is_help=True, help="Cut, degrade and restore radio links.")
+param = typer.Typer(no_args_is_help=True, help="Parameters: gains by their names, channel, sizes of failures, rates.")
+keys = typer.Typer(no_args_is_help=True, help="Keys of signed links to the ground.")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to ``app``."""
+    for command in (vehicles, failures, fault, repair, leader, attitude, ftc, mode, pause, step, resume, speed):
+        app.command()(command)
+    for name, group in (("link", link), ("param", param), ("keys", keys)):
+        app.add_typer(group, name=name)
+
+
+@contextmanager
+def _station(swarm: str | None, key: Path | None) -> Iterator[Station]:
+    """A station; a refusal ends with exit code 1, a vehicle that is not there with 2."""
+    from ftcc.groundside.station import RefusedError, Station
+
+    with Station(swarm, key=key) as station:
+        try:
+            yield station
+        except RefusedError as error:
+            terminal(stderr=True).print(f"ftcc: {error}", style="bold red", markup=False, highlight=False)
+            raise typer.Exit(_REFUSED) from None
+
+
+def _say(text: str) -> None:
+    terminal().print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def vehicles(swarm: Swarm = None, key: Key = None) -> None:
+    """List the UAVs of a running swarm and what they tell of themselves."""
+    from rich.table import Table
+
+    from ftcc.groundside.station import NoAnswerError
+
+    table = Table("UAV", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
+    silent = False
+    with _station(swarm, key) as station:
+        for uav, state in zip(station.uavs, station.vehicles(), strict=True):
+            if isinstance(state, NoAnswerError):
+                table.add_row(str(uav), station.card(uav).role, "does not answer")
+                silent = True
+                continue
+            tolerance = {None: "", True: "on", False: "off"}[state.fault_tolerance]
+            numbers = (f"{state.t:.2f}", f"{state.altitude:.2f}", f"{state.airspeed:.2f}")
+            table.add_row(str(uav), state.role, state.mode, *numbers, tolerance)
+    terminal().print(table)
+    if silent:
+        raise typer.Exit(2)
+
+
+def failures() -> None:
+    """List everything that can be made to fail, and what MAV_CMD_INJECT_FAILURE means here."""
+    from rich.table import Table
+
+    from ftcc.link.failures import FAILURES, KINDS, SIZES
+
+    table = Table("unit", "instance", "type", "means", "size from", box=None)
+    for one in FAILURES:
+        unit, kind = f"{one.unit.code} {one.unit.name}", f"{KINDS[one.kind]} {one.kind.upper()}"
+        table.add_row(unit, one.unit.instances, kind, one.text, " ".join(one.sizes))
+    sizes = Table("parameter", "default", "range", "unit", "means", box=None)
+    for size in SIZES:
+        sizes.add_row(size.name, f"{size.default:g}", f"{size.low:g} .. {size.high:g}", size.unit, size.meaning)
+    out = terminal()
+    out.print(table)
+    out.print()
+    out.print(sizes)
+    out.print("\nThey act at parameter FTCC_AT (simulated ms, 0 = at once), if SYS_FAILURE_EN is 1.", highlight=False)
+
+
+def fault(
+    uav: Uav,
+    what: Annotated[str, typer.Argument(help="aileron, elevator, rudder, thrust; position, attitude (navigation).")],
+    kind: Annotated[str, typer.Option(help="wrong, off, stuck, slow, intermittent.")] = "wrong",
+    effectiveness: Annotated[float | None, typer.Option(help="Remaining effectiveness, 0..1; default 1.")] = None,
+    bias: Annotated[float | None, typer.Option(help="rad or N.")] = None,
+    onset: Annotated[float | None, typer.Option(help="Rate of the exponential onset, 1/s; default: a step.")] = None,
+    slew: Annotated[float | None, typer.Option(help="Largest rate of a slow actuator, rad/s or N/s.")] = None,
+    period: Annotated[float | None, typer.Option(help="Of intermittent faults, s.")] = None,
+    duty: Annotated[float | None, typer.Option(help="Healthy share of the period, 0..1.")] = None,
+    size: Annotated[list[str] | None, typer.Option(metavar="FAIL_NAME=VALUE", help="Any other size.")] = None,
+    at: At = None,
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Make an actuator, or the navigation solution, of a UAV fail."""
+    sizes: dict[str, float] = {}
+    if kind in ("wrong", "intermittent") and what not in ("position", "attitude"):
+        sizes |= {"eff": 1.0 if effectiveness is None else effectiveness, "bias": bias or 0.0}
+        if effectiveness is None and bias is None:
+            fail(f"fault {what}: say how large it is: --effectiveness, --bias")
+    if kind == "wrong" and what not in ("position", "attitude"):
+        sizes |= {"eff_rate": onset or 0.0, "bias_rate": onset or 0.0}
+    sizes |= {name: value for name, value in (("slew", slew), ("period", period), ("duty", duty)) if value is not None}
+    for setting in size or []:
+        name, _, text = setting.partition("=")
+        try:
+            sizes[name.lower().removeprefix("fail_")] = float(text)
+        except ValueError:
+            fail(f"--size {setting}: must be FAIL_NAME=NUMBER, see `ftcc failures`")
+    with _station(swarm, key) as station:
+        when = station.fault(uav, what, kind=kind, at=at, **sizes)
+    _say(f"UAV {uav}: {what} {kind} at t = {when:g} s")
+
+
+def repair(
+    uav: Uav,
+    what: Annotated[str | None, typer.Argument(help="What to repair; default: everything on board.")] = None,
+    at: At = None,
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Repair a UAV's actuators and navigation."""
+    with _station(swarm, key) as station:
+        station.repair(uav, what, at=at)
+    _say(f"UAV {uav}: {what or 'everything on board'} repaired")
+
+
+def _ends(a: int, b: int | None) -> str:
+    return f"links of UAV {a}" if b is None else f"link {a} - {b}"
+
+
+def _partial(problems: list[str], done: str) -> None:
+    """Say what was done, and at which of the ends it was not."""
+    _say(done)
+    for problem in problems:
+        warn(f"not at both ends: {problem}")
+    if problems:
+        raise typer.Exit(_REFUSED)
+
+
+@link.command("cut")
+def link_cut(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = None, key: Key = None) -> None:
+    """Cut the links between two UAVs, or switch the radio of one off."""
+    with _station(swarm, key) as station:
+        problems = station.cut(uav, other, at=at)
+    _partial(problems, f"{_ends(uav, other)} cut")
+
+
+@link.command("restore")
+def link_restore(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = None, key: Key = None) -> None:
+    """Restore the links between two UAVs, or those of one and its radio."""
+    with _station(swarm, key) as station:
+        problems = station.restore(uav, other, at=at)
+    _partial(problems, f"{_ends(uav, other)} restored")
+
+
+@link.command("degrade")
+def link_degrade(
+    uav: Uav,
+    other: Other = None,
+    loss: Annotated[float | None, typer.Option(help="Probability of loss.")] = None,
+    burst_start: Annotated[float | None, typer.Option(help="Probability per record of entering a burst.")] = None,
+    burst_end: Annotated[float | None, typer.Option(help="Probability per record of leaving it.")] = None,
+    burst_loss: Annotated[float | None, typer.Option(help="Probability of loss within a burst.")] = None,
+    delay: Annotated[float | None, typer.Option(help="s, beyond the link latency.")] = None,
+    jitter: Annotated[float | None, typer.Option(help="s, further delay, uniform.")] = None,
+    at: At = None,
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Degrade the links between two UAVs, or all of one."""
+    names = ("loss", "burst_s", "burst_e", "burst_l", "delay", "jitter")
+    given = zip(names, (loss, burst_start, burst_end, burst_loss, delay, jitter), strict=True)
+    sizes = {name: value for name, value in given if value is not None}
+    with _station(swarm, key) as station:
+        problems = station.degrade(uav, other, at=at, **sizes)
+    _partial(problems, f"{_ends(uav, other)} degraded")
+
+
+@param.command("get")
+def param_get(
+    uav: Uav, name: Annotated[str, typer.Argument(help="In any case of letters.")], swarm: Swarm = None, key: Key = None
+) -> None:
+    """Show the value in force."""
+    with _station(swarm, key) as station:
+        _say(f"{station.get(uav, name):.9g}")
+
+
+@param.command("set")
+def param_set(
+    uav: Uav,
+    name: Annotated[str, typer.Argument(help="In any case of letters.")],
+    value: Annotated[float, typer.Argument()],
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Set a parameter; refused values leave the one in force."""
+    with _station(swarm, key) as station:
+        _say(f"{name} = {station.set(uav, name, value):.9g}")
+
+
+@param.command("list")
+def param_list(uav: Uav, swarm: Swarm = None, key: Key = None) -> None:
+    """List all parameters of a UAV."""
+    with _station(swarm, key) as station:
+        for name, value in station.parameters(uav).items():
+            _say(f"{name:16} {value:.9g}")
+
+
+def leader(
+    uav: Uav,
+    altitude: Annotated[float | None, typer.Option(help="m.")] = None,
+    speed: Annotated[float | None, typer.Option(help="m/s.")] = None,
+    at: At = None,
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Give a leader another altitude or speed."""
+    with _station(swarm, key) as station:
+        station.lead(uav, altitude=altitude, speed=speed, at=at)
+    asked = [f"{altitude:g} m"] if altitude is not None else []
+    asked += [f"{speed:g} m/s"] if speed is not None else []
+    _say(f"UAV {uav}: commanded to {', '.join(asked)}")
+
+
+def attitude(
+    uav: Uav,
+    bank: Annotated[float, typer.Option(help="deg, about the velocity.")] = 0.0,
+    alpha: Annotated[float, typer.Option(help="deg, angle of attack.")] = 0.0,
+    beta: Annotated[float, typer.Option(help="deg, sideslip.")] = 0.0,
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Have a UAV of an attitude scheme fly another attitude (mode offboard)."""
+    with _station(swarm, key) as station:
+        station.attitude(uav, bank=math.radians(bank), alpha=math.radians(alpha), beta=math.radians(beta))
+    _say(f"UAV {uav}: bank {bank:g}, angle of attack {alpha:g}, sideslip {beta:g} deg")
+
+
+def ftc(
+    uav: Uav,
+    state: Annotated[str, typer.Argument(metavar="on|off")],
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Switch the fault tolerance of a UAV's control law on or off."""
+    if state not in ("on", "off"):
+        fail(f"ftc {state}: must be on or off")
+    with _station(swarm, key) as station:
+        station.fault_tolerance(uav, state == "on")
+    _say(f"UAV {uav}: fault tolerance {state}")
+
+
+def mode(
+    uav: Uav,
+    name: Annotated[str, typer.Argument(metavar="MODE", help="mission, hold or offboard.")],
+    swarm: Swarm = None,
+    key: Key = None,
+) -> None:
+    """Set a UAV's mode: mission (the scheme flies), hold, offboard."""
+    with _station(swarm, key) as station:
+        station.mode(uav, name)
+    _say(f"UAV {uav}: mode {name}")
+
+
+# The flow of time.
+
+_Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
+_HOLDING = 10.0
+"""Wall time within which a swarm must be held, s."""
+
+
+def _tell(name: str | None, command: str, **arguments: float) -> None:
+    from ftcc.groundside.registry import find, tell
+
+    try:
+        tell(find(name), command, **arguments)
+    except LookupError as error:
+        fail(str(error))
+    except (OSError, RuntimeError) as error:
+        terminal(stderr=True).print(f"ftcc: {error}", style="bold red", markup=False, highlight=False)
+        raise typer.Exit(_REFUSED) from None
+
+
+def _wait_until_held(name: str | None) -> None:
+    from ftcc.groundside.registry import find, tell
+
+    until = time.monotonic() + _HOLDING
+    while time.monotonic() < until:
+        status = tell(find(name), "status")
+        if status["state"] == "held":
+            _say(f"held at t = {status['t']:g} s")
+            return
+        time.sleep(0.02)
+    fail(f"not held after {_HOLDING:g} s")
+
+
+def pause(name: _Name = None) -> None:
+    """Hold a swarm: all its vehicles at the same tick."""
+    _tell(name, "pause")
+    _wait_until_held(name)
+
+
+def step(
+    ticks: Annotated[int, typer.Argument(min=1, help="Ticks to fly.")] = 1,
+    swarm: Swarm = None,
+) -> None:
+    """Fly so many ticks of a swarm that is held, and hold it again."""
+    _tell(swarm, "step", ticks=ticks)
+    _wait_until_held(swarm)
+
+
+def resume(name: _Name = None) -> None:
+    """Let a swarm that is held go on, also one started with --hold."""
+    _tell(name, "resume")
+
+
+def speed(
+    factor: Annotated[float, typer.Argument(help="Simulated seconds per second.")],
+    swarm: Swarm = None,
+) -> None:
+    """Change how fast a swarm flies."""
+    if not 0.0 < factor < 1000.0:
+        fail(f"speed {factor:g}: must be a positive factor below 1000")
+    _tell(swarm, "speed", factor=factor)
+
+
+# Keys.
+
+
+@keys.command("new")
+def keys_new(
+    file: Annotated[Path | None, typer.Argument(help="Default: in the user's configuration.")] = None,
+) -> None:
+    """Make a key file for signed links: `ftcc fly --key FILE`."""
+    from ftcc.link.signing import KeyFileError, default_key_file, new_key_file
+
+    path = file or default_key_file()
+    try:
+        new_key_file(path)
+    except KeyFileError as error:
+        fail(str(error))
+    _say(f"wrote {path}; its line is the pass phrase for other ground stations (MAVProxy: signing key PHRASE)")

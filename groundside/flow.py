@@ -1,0 +1,130 @@
+"""The flow of simulated time of a running swarm: hold it at one tick, step it, let it go on, change its speed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, Literal
+
+from ftcc.link.gate import Limit, Pace
+
+__all__ = ["START", "Flow", "FlowError"]
+
+START = 0.05
+"""Wall time between word and deed, s."""
+
+
+class FlowError(ValueError):
+    """What is asked for is not possible now."""
+
+
+class Flow:
+    """Holds all vehicle processes before the same tick, and lets them go together.
+
+    Parameters
+    ----------
+    period : control period, s.
+    speed : simulated seconds per second; of no meaning in ``lockstep``.
+    held : start held before tick 0.
+    tell : says something to all processes.
+    flying : names of the vehicle processes that still fly.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        speed: float,
+        lockstep: bool,
+        held: bool,
+        tell: Callable[[Any], None],
+        flying: Callable[[], Iterable[str]],
+    ) -> None:
+        self.period = period
+        self.speed = speed
+        self.lockstep = lockstep
+        self._tell = tell
+        self._flying = flying
+        self._ticks: dict[str, int] = {}
+        """Before which tick each process is held."""
+        self._pace = Pace(0.0, 0, speed)
+        self.state: Literal["flying", "holding", "held"] = "held" if held else "flying"
+        self.tick = 0
+        """Before which the swarm is held."""
+
+    def begin(self) -> tuple[Pace, Limit]:
+        """How the flight begins."""
+        self._pace = Pace(time.monotonic() + START, 0, self.speed)
+        return self._pace, Limit(-1 if self.state == "held" else None)
+
+    def pause(self) -> None:
+        """Hold everybody, wherever they are; they are brought to one tick as they answer."""
+        if self.state == "flying":
+            self.state = "holding"
+            self._ticks.clear()
+            self._tell(Limit(-1))
+
+    def held(self, name: str, tick: int) -> None:
+        """A process is held before a tick."""
+        self._ticks[name] = tick
+        flying = set(self._flying())
+        if self.state != "holding" or not flying <= set(self._ticks):
+            return
+        ticks = {self._ticks[one] for one in flying}
+        self.tick = max(ticks)
+        if len(ticks) == 1:
+            self.state = "held"
+        else:
+            self._go_on(min(ticks), Limit(self.tick - 1))
+
+    def step(self, ticks: int) -> None:
+        """Fly so many ticks and hold again.
+
+        Raises
+        ------
+        FlowError
+            If the swarm is not held.
+        """
+        self._require_held("step")
+        self.state = "holding"
+        self._go_on(self.tick, Limit(self.tick + ticks - 1))
+
+    def resume(self) -> None:
+        """Let a held swarm fly.
+
+        Raises
+        ------
+        FlowError
+            If it is not held.
+        """
+        self._require_held("resume")
+        self.state = "flying"
+        self._go_on(self.tick, Limit(None))
+
+    def set_speed(self, speed: float) -> None:
+        """Change the pace, in flight or for when it goes on.
+
+        Raises
+        ------
+        FlowError
+            In lockstep, which has no pace.
+        """
+        if self.lockstep:
+            raise FlowError("a swarm in lockstep (--speed max) has no pace that could be changed")
+        self.speed = speed
+        if self.state == "flying":
+            # From one tick on that is due soon, the same for all.
+            ahead = (time.monotonic() + START - self._pace.wall) * self._pace.speed / self.period
+            tick = self._pace.tick + max(0, int(ahead))
+            due = self._pace.wall + (tick - self._pace.tick) * self.period / self._pace.speed
+            self._pace = Pace(due, tick, speed)
+            self._tell(self._pace)
+
+    def _require_held(self, what: str) -> None:
+        if self.state != "held":
+            raise FlowError(f"the swarm is {self.state}: pause it before you {what} it")
+
+    def _go_on(self, tick: int, limit: Limit) -> None:
+        self._ticks.clear()
+        self._pace = Pace(time.monotonic() + START, tick, self.speed)
+        self._tell(self._pace)
+        self._tell(limit)
