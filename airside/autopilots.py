@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.model import Model
-from ftcc.airside.modes import HOLD, MISSION
 from ftcc.airside.references import of_plant
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
@@ -39,6 +38,7 @@ from ftcc.airside.spec import AutopilotSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS, SLOT, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
+from ftcc.link.modes import HOLD, MISSION
 from ftcc.link.timing import Timing
 
 __all__ = [

@@ -12,11 +12,11 @@ from typing import Any
 from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
-from ftcc.airside.modes import HOLD
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import hear
 from ftcc.link.compiled import compiled, copy, fields, store, width
+from ftcc.link.modes import HOLD
 
 __all__ = ["SWEEPS", "announce", "anticipate", "control", "hear_and_control", "refer"]
 

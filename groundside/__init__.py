@@ -1,4 +1,8 @@
-"""What people touch. `Run` opens a recorded flight; `load` and `resolve` prepare one for `simulate.simulate`."""
+"""What people touch.
+
+`Run` opens a recorded flight; `load` and `resolve` prepare one for `simulate.simulate`; `Station` commands a running
+swarm.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ftcc.groundside.conversation import StationError
     from ftcc.groundside.mission import Mission, resolve
     from ftcc.groundside.run import Run, RunError
     from ftcc.groundside.scenario import Scenario, ScenarioError, load
+    from ftcc.groundside.station import Station
 
-__all__ = ["Mission", "Run", "RunError", "Scenario", "ScenarioError", "load", "resolve"]
+__all__ = ["Mission", "Run", "RunError", "Scenario", "ScenarioError", "Station", "StationError", "load", "resolve"]
 
 _HOMES = {
     "Mission": "mission",
@@ -19,6 +25,8 @@ _HOMES = {
     "RunError": "run",
     "Scenario": "scenario",
     "ScenarioError": "scenario",
+    "Station": "station",
+    "StationError": "conversation",
     "load": "scenario",
 }
 

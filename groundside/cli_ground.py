@@ -207,7 +207,7 @@ def param_get(
         _say(f"{station.get(uav, name):.9g}")
 
 
-@param.command("set")
+@param.command("set", context_settings={"ignore_unknown_options": True})  # values may be negative
 def param_set(
     uav: Uav,
     name: Annotated[str, typer.Argument(help="In any case of letters.")],
@@ -308,7 +308,10 @@ def _wait_until_held(name: str | None) -> None:
 
     until = time.monotonic() + _HOLDING
     while time.monotonic() < until:
-        status = tell(find(name), "status")
+        try:
+            status = tell(find(name), "status")
+        except (LookupError, OSError, RuntimeError) as error:
+            fail(f"the swarm has ended before it was held ({error})")
         if status["state"] == "held":
             _say(f"held at t = {status['t']:g} s")
             return

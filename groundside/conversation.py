@@ -114,9 +114,7 @@ class Conversation:
         RefusedError
             If there is no such parameter.
         """
-        return self._parameter(
-            uav, dialect.MAVLink_param_request_read_message(uav, AUTOPILOT, name.encode(), -1), name
-        )[0]
+        return self._read(uav, name)[0]
 
     def set(self, uav: int, name: str, value: float) -> float:
         """Set a parameter; the value in force, which is the one asked for.
@@ -126,9 +124,7 @@ class Conversation:
         RefusedError
             If the UAV does not take the value; the former one stays in force.
         """
-        before, kind = self._parameter(
-            uav, dialect.MAVLink_param_request_read_message(uav, AUTOPILOT, name.encode(), -1), name
-        )
+        before, kind = self._read(uav, name)
         integer = kind == dialect.MAV_PARAM_TYPE_INT32
         if not math.isfinite(value) or (integer and value != int(value)):
             raise RefusedError(f"UAV {uav}: {name} = {value}: must be {'a whole' if integer else 'a finite'} number")
@@ -156,6 +152,11 @@ class Conversation:
             if len(found) == count:
                 return dict(found[n] for n in sorted(found))
         raise NoAnswerError(f"UAV {uav} has told {len(found)} of its parameters and no more")
+
+    def _read(self, uav: int, name: str) -> tuple[float, int]:
+        """Value and type of a parameter."""
+        request = dialect.MAVLink_param_request_read_message(uav, AUTOPILOT, name.encode()[:16], -1)
+        return self._parameter(uav, request, name)
 
     def _parameter(self, uav: int, request: Any, name: str) -> tuple[float, int]:
         def answers(message: Any) -> bool:

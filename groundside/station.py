@@ -16,17 +16,17 @@ from typing import Self
 
 import numpy as np
 
-from ftcc.airside.ground import code_of, mode_called
 from ftcc.groundside.conversation import Conversation, NoAnswerError, RefusedError, StationError
 from ftcc.link.failures import KINDS, UNITS
 from ftcc.link.mavlink import AUTOPILOT, dialect
-from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, V
-from ftcc.sim.sensors import encode_state
+from ftcc.link.modes import code_of, mode_called
 
 __all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState"]
 
 ACTUATORS = {"aileron": ("servo", 1), "elevator": ("servo", 2), "rudder": ("servo", 3), "thrust": ("motor", 1)}
 """Unit and instance of what can fail on board by our names."""
+
+_NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
 
 _ON_BOARD = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
 
@@ -167,10 +167,8 @@ class Station(Conversation):
             for kind, given in kinds.items():
                 if given:
                     # A size that is left out is none at all, not the one of last time.
-                    none = (
-                        {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0} if kind == "intermittent" else {}
-                    )
-                    self.inject(uav, "radio", kind, sender, at=at, **{**none, **given})
+                    none = _NO_LOSS if kind == "intermittent" else {}
+                    self.inject(uav, "radio", kind, sender, at=at, **(none | given))
 
         if b is not None:
             return self._both_ends(a, b, degrade)
@@ -228,6 +226,10 @@ class Station(Conversation):
 
     def attitude(self, uav: int, *, bank: float, alpha: float, beta: float = 0.0) -> None:
         """Have a UAV of an attitude scheme fly another attitude (rad) with respect to its velocity, for good."""
+        # They load numba, which no other command needs.
+        from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, V
+        from ftcc.sim.sensors import encode_state
+
         place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
         ground = math.hypot(place.vx, place.vy)
         asked, message = np.zeros(len(TRUTH)), np.zeros(13)

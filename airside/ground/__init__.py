@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ftcc.airside.ground.link import GroundLink
-from ftcc.airside.ground.modes import code_of, mode_called
 from ftcc.airside.ground.seat import Home, Seat
 from ftcc.airside.ground.streams import LINK_FIELDS
 
-__all__ = ["LINK_FIELDS", "GroundLink", "Home", "Seat", "code_of", "mode_called"]
+__all__ = ["LINK_FIELDS", "GroundLink", "Home", "Seat"]

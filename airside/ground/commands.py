@@ -7,11 +7,10 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ftcc.airside.ground.modes import NAMES, mode_of
 from ftcc.airside.ground.streams import requested
-from ftcc.airside.modes import HOLD, MISSION, OFFBOARD
 from ftcc.airside.references.profiles import climb_of_step, command_from_ground, release_from_ground
 from ftcc.link.mavlink import as_typed, dialect
+from ftcc.link.modes import HOLD, MISSION, NAMES, OFFBOARD, mode_of
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

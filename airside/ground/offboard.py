@@ -7,9 +7,9 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ftcc.airside.ground.commands import ACCEPTED, lead, set_mode
-from ftcc.airside.modes import HOLD, OFFBOARD
 from ftcc.airside.references import of_plant
 from ftcc.link.mavlink import as_typed, dialect
+from ftcc.link.modes import HOLD, OFFBOARD
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ftcc.airside.ground.commands import read_request, set_mode
-from ftcc.airside.ground.modes import mode_of
 from ftcc.airside.ground.parameters import RefusedError
 from ftcc.link.mavlink import dialect
+from ftcc.link.modes import mode_of
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

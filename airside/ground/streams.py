@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.ground.modes import custom_mode
 from ftcc.airside.ground.seat import Seat
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
 from ftcc.link.mavlink import dialect, float_array
+from ftcc.link.modes import custom_mode
 
 __all__ = ["LINK_FIELDS", "ON_REQUEST", "STREAMS", "Schedule", "Stream", "heartbeat", "rates_of", "requested"]
 

@@ -1,14 +1,15 @@
-"""Flight modes as a PX4-type ground station names them, and what they mean here.
-
-mission: the scheme flies. hold: what is referred to stands still and neighbours are ignored; they are still told.
-offboard: targets from the ground.
-"""
+"""Modes of an autopilot: as numbers that compiled functions understand, and as a PX4-type ground station names them."""
 
 from __future__ import annotations
 
-from ftcc.airside.modes import HOLD, MISSION, OFFBOARD
+__all__ = ["HOLD", "MISSION", "NAMES", "OFFBOARD", "code_of", "custom_mode", "mode_called", "mode_of"]
 
-__all__ = ["NAMES", "code_of", "custom_mode", "mode_called", "mode_of"]
+MISSION = 0
+"""The scheme flies."""
+HOLD = 1
+"""What the UAV refers to stands still, neighbours are ignored; they are still told."""
+OFFBOARD = 2
+"""The scheme flies; what the UAV refers to by itself comes from the ground."""
 
 NAMES = {MISSION: "mission", HOLD: "hold", OFFBOARD: "offboard"}
 
