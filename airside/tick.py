@@ -81,8 +81,8 @@ else:
 def refer(autopilots, i, now_us, period_us):
     """Bring what UAV ``i`` refers to by itself to this tick; once at every tick. In hold it stands still."""
     if autopilots.mode[i] == HOLD:
-        autopilots.held_us[i] += period_us
-        _stand(autopilots.reference[i])
+        if _stand(autopilots.reference[i], period_us):
+            autopilots.held_us[i] += period_us
         return
     parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
     _refer(parameters, commands, autopilots.reference[i], now_us - autopilots.held_us[i], period_us)

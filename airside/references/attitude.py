@@ -68,7 +68,8 @@ def refer(parameters, commands, reference, now_us, period_us):
 
 
 @compiled
-def stand(reference):
-    """Hold: keep the attitude."""
+def stand(reference, period_us):
+    """Hold: keep the attitude; the commands wait."""
     for axis in range(3):
         reference[3 + axis] = 0.0
+    return True

@@ -34,5 +34,6 @@ def refer(parameters, commands, reference, now_us, period_us):
 
 
 @compiled
-def stand(reference):
+def stand(reference, period_us):
     """They do so in hold, too."""
+    return True

@@ -21,7 +21,7 @@ from ftcc.airside.elements.filters import reference_shaper
 from ftcc.airside.scheme import Quantity
 from ftcc.link.compiled import compiled, fields
 
-__all__ = ["Command", "Fire", "Reference", "border", "centre", "moved", "refer", "start"]
+__all__ = ["Command", "Fire", "Reference", "border", "centre", "moved", "refer", "stand", "start"]
 
 Q = Quantity
 
@@ -160,6 +160,15 @@ def refer(parameters, commands, reference, now_us, period_us):
         before = (now_us - period_us) / 1e6
         _follow(reference, commands[in_force(commands, before)], before, fire, period_us / 1e6)
     _place(reference, now, fire)
+
+
+@compiled
+def stand(reference, period_us):
+    """Hold: straight on, at the present velocity."""
+    for axis in range(3):
+        reference[axis] += reference[3 + axis] * period_us / 1e6
+        reference[6 + axis] = 0.0
+    return False  # the fire burns on meanwhile
 
 
 def start(fire: Fire, commands: Sequence[Command]) -> Reference:
