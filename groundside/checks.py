@@ -420,8 +420,8 @@ def check_faults(
             unit = unit_of(fault.actuator)
             text = (
                 f"faults.{n} (effectiveness {remaining:g}, bias {fault.bias:g} {unit}): leaves "
-                f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need the command "
-                f"({needed:.3f} - {fault.bias:g})/{remaining:g} = {command:.3f} {unit}; "
+                f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need "
+                f"the command ({needed:.3f} - {fault.bias:g})/{remaining:g} = {command:.3f} {unit}; "
                 f"allowed is {low:g} to {high:g}"
             )
             if fault.without_trim:
