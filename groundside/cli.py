@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside import cli_fly, cli_ground, cli_study
+from ftcc.groundside import cli_airframe, cli_fly, cli_ground, cli_study
 from ftcc.groundside.cli_common import (
     Duration,
     Form,
@@ -234,6 +234,7 @@ def compare(
     terminal(stderr=True).print(f"wrote {page}", highlight=False, soft_wrap=True)
 
 
+cli_airframe.register(app)
 cli_fly.register(app)
 cli_ground.register(app)
 cli_study.register(app)

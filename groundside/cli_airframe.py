@@ -1,0 +1,163 @@
+"""The command ``ftcc airframe``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ftcc.groundside.cli_common import fail, terminal
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ftcc.sim.modes import Mode
+    from ftcc.sim.trim import Trim
+
+__all__ = ["register"]
+
+_COLUMNS_TO_CHOOSE = 6
+"""More airspeeds than this do not fit side by side."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to ``app``."""
+    app.command()(airframe)
+
+
+def airframe(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="A shipped airframe's name, or a TOML file.")] = (
+        "reference_25kg"
+    ),
+    airspeed: Annotated[
+        list[float] | None, typer.Option(help="m/s; repeatable. Default: 18, 22, 25, 30 and 35.")
+    ] = None,
+    coefficient: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=FACTOR", help="Multiply an aerodynamic coefficient, or all others; repeatable."),
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the poles.")] = None,
+) -> None:
+    """Show level trim and linear modes of an airframe, thrust and surfaces fixed."""
+    from ftcc.groundside.scenario import load_airframe
+    from ftcc.sim.airframe import Airframe, scaled
+    from ftcc.sim.modes import modes
+    from ftcc.sim.trim import TrimError, trim
+
+    speeds = airspeed or [18.0, 22.0, 25.0, 30.0, 35.0]
+    for V in speeds:
+        if not (math.isfinite(V) and V > 0.0):
+            fail(f"--airspeed {V:g}: must be a positive number of m/s")
+    if len(speeds) > _COLUMNS_TO_CHOOSE:
+        fail(f"--airspeed: {len(speeds)} of them; at most {_COLUMNS_TO_CHOOSE} fit side by side")
+    sheet = load_airframe(name, Path("--airframe"))
+    aircraft = Airframe(**{field: float(getattr(sheet, field)) for field in Airframe._fields})
+    try:
+        aircraft = scaled(aircraft, _factors(coefficient or []))
+    except ValueError as error:
+        fail(f"--coefficient {error}")
+    try:
+        levels = {V: trim(aircraft, V) for V in speeds}
+    except TrimError as error:
+        fail(f"--airspeed: {error}")
+    found = {V: modes(aircraft, V) for V in speeds}
+    out = terminal()
+    out.print(sheet.title or name, highlight=False)
+    out.print()
+    out.print(_trims(levels))
+    out.print()
+    out.print(_modes(found))
+    if plot is not None:
+        try:
+            _draw(found, sheet.title or name, plot)
+        except (OSError, ValueError) as error:
+            fail(f"--plot {plot}: cannot be written: {error}")
+        terminal(stderr=True).print(f"wrote {plot}", highlight=False, soft_wrap=True)
+
+
+def _factors(given: list[str]) -> dict[str, float]:
+    factors = {}
+    for one in given:
+        name, equals, text = one.partition("=")
+        try:
+            value = float(text) if equals else math.nan
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            fail(f"--coefficient {one}: must be NAME=FACTOR, such as all=1.2 or CLde=1")
+        factors[name.strip()] = value
+    return factors
+
+
+def _table(heading: str) -> Table:
+    from rich.table import Table
+
+    made = Table(header_style="bold", box=None, pad_edge=False)
+    made.add_column(heading)
+    return made
+
+
+def _trims(levels: dict[float, Trim]) -> Table:
+    """A row per airspeed."""
+    table = _table("V, m/s")
+    for heading in ("alpha, rad", "deg", "elevator, rad", "deg", "thrust, N"):
+        table.add_column(heading, justify="right")
+    for V, level in levels.items():
+        table.add_row(
+            f"{V:g}",
+            f"{level.alpha:.6f}",
+            f"{math.degrees(level.alpha):.3f}",
+            f"{level.elevator:.6f}",
+            f"{math.degrees(level.elevator):.3f}",
+            f"{level.thrust:.3f}",
+        )
+    return table
+
+
+def _modes(found: dict[float, list[Mode]]) -> Table:
+    """A row per mode, a column per airspeed."""
+    table = _table("mode")
+    for V in found:
+        table.add_column(f"{V:g} m/s", justify="right")
+    for name in dict.fromkeys(mode.name for modes in found.values() for mode in modes):
+        cells = [[_shown(mode) for mode in modes if mode.name == name] for modes in found.values()]
+        alike = [mode for modes in found.values() for mode in modes if mode.name == name]
+        unit = "wn rad/s, zeta" if all(mode.oscillates for mode in alike) else "1/s"
+        table.add_row(f"{name} {unit}", *("; ".join(cell) for cell in cells))
+    return table
+
+
+def _shown(mode: Mode) -> str:
+    return f"{mode.frequency:.3f}, {mode.damping:.3f}" if mode.oscillates else f"{mode.eigenvalue.real:+.4f}"
+
+
+def _draw(found: dict[float, list[Mode]], title: str, file: Path) -> None:
+    """Poles in the complex plane, and those near the origin once more."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.5), layout="constrained")
+    markers = {"short period": "o", "phugoid": "s", "roll": "D", "Dutch roll": "^", "spiral": "v", "roll-spiral": "*"}
+    for shade, modes in enumerate(found.values()):
+        for mode in modes:
+            for root in {mode.eigenvalue, mode.eigenvalue.conjugate()}:
+                for axis in axes:
+                    axis.plot(root.real, root.imag, markers[mode.name], color=f"C{shade}", fillstyle="none")
+    for name in dict.fromkeys(mode.name for modes in found.values() for mode in modes):
+        axes[0].plot([], [], markers[name], color="gray", fillstyle="none", label=name)
+    for shade, V in enumerate(found):
+        axes[1].plot([], [], "-", color=f"C{shade}", label=f"{V:g} m/s")
+    slow = max(abs(mode.eigenvalue) for modes in found.values() for mode in modes if mode.name in ("phugoid", "spiral"))
+    axes[1].set(xlim=(-1.3 * slow, 1.3 * slow), ylim=(-1.3 * slow, 1.3 * slow), title="near the origin")
+    axes[0].set(title=f"poles of {title}")
+    for axis in axes:
+        axis.axvline(0.0, color="gray", linewidth=0.8)
+        axis.set(xlabel="real part, 1/s", ylabel="imaginary part, rad/s")
+        axis.grid(alpha=0.3)
+        axis.legend()
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
