@@ -105,6 +105,8 @@ class Autopilots(NamedTuple):
     """(m,): which entries of its `Reference` a leader shares; -1 = unused."""
     actuator: NDArray[np.int64]
     """(n,): slot of each of the scheme's commands."""
+    course: NDArray[np.float64]
+    """(k,): course that `lateral_hold` keeps, rad; nan = it does nothing."""
     mode: NDArray[np.int64]
     """(k,): see `modes`."""
     held_us: NDArray[np.int64]
@@ -220,6 +222,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             profile_state=states,
             leader_shares=np.array(shares + [-1] * (values - len(shares)), np.int64),
             actuator=np.array([SLOT[name] for name in scheme.commands], np.int64),
+            course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
             mode=np.full(k, MISSION),
             held_us=np.zeros(k, np.int64),
         ),

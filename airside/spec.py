@@ -56,7 +56,7 @@ class AutopilotSpec:
     """In the order of the scheme's ``Gains``."""
     model: Model
     command: tuple[float, ...]
-    """What the actuators that the law does not command are told (rad, N), by slot."""
+    """What the actuators that nobody commands are told (rad, N), by slot."""
     travel: tuple[float, ...]
     """Full deflection of each actuator (rad, N), by which commands are divided on the wire."""
     reference: OwnReference
@@ -70,6 +70,8 @@ class AutopilotSpec:
     """A leader's."""
     offset: float = 0.0
     """Lateral position, m."""
+    course: float | None = None
+    """Course that `lateral_hold` keeps for a law that commands no aileron and rudder, rad; None: there is none."""
     hearers: tuple[int, ...] = field(default=())
     """Ids of those who hear this UAV."""
     tolerant_gains: tuple[float, ...] = ()

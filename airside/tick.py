@@ -11,6 +11,7 @@ from typing import Any
 
 from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own
+from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import encode_command
@@ -135,6 +136,8 @@ def control(autopilots, inbox, i, dt):
     _show(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
         autopilots.command[i, autopilots.actuator[n]] = shown[n]
+    if autopilots.course[i] == autopilots.course[i]:
+        hold_course(own, autopilots.course[i], model, autopilots.command[i])
     return True
 
 

@@ -247,7 +247,7 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
             if name not in plant.START and getattr(start, name) is not None:
                 findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
     for name in plant.COMPLETED:
-        if getattr(plan.noise, name) > 0.0:
+        if getattr(plan.noise, name) * plan.noise.factor > 0.0:
             findings.refuse(f"noise.{name}: follows from the other channels as measured; give those")
     channels = [name for name, _ in plant.DISTURBANCES]
     for n, disturbance in enumerate(plan.disturbances):

@@ -139,6 +139,8 @@ def resolve(scenario: Scenario) -> Mission:
     findings.stop_if_refused()
 
     known = briefings(scheme, vehicles, profiles)
+    # Laws for the vertical plane fly north.
+    steered = scheme.plant == "longitudinal" and "aileron" in plant.ACTUATORS
     autopilots = tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -158,6 +160,7 @@ def resolve(scenario: Scenario) -> Mission:
             link_events=tuple(changes.get(vehicle.uav, ())),
             profile=profiles.get(vehicle.uav),
             offset=vehicle.offset,
+            course=0.0 if steered and vehicle.uav in graph.followers else None,
             hearers=tuple(graph.receivers(vehicle.uav)),
         )
         for vehicle in vehicles
