@@ -181,7 +181,7 @@ def resolve(scenario: Scenario) -> Mission:
         autopilots=autopilots,
         claims=tuple(claim for claim in plan.claims if scenario.case in claim.expected),
         warnings=tuple(findings.warned),
-        toml=_as_flown(scenario),
+        toml=_as_flown(scenario, scheme),
         home=(plan.home.latitude, plan.home.longitude, plan.home.altitude),
         events=_planned(plan, plant),
     )
@@ -360,11 +360,14 @@ _VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "
 """What the numbers of a flight may depend on."""
 
 
-def _as_flown(scenario: Scenario) -> str:
+def _as_flown(scenario: Scenario, scheme: Scheme) -> str:
+    """The merged scenario with seed, versions, and every gain by value: a later default must not change it."""
     versions = {name: importlib.metadata.version(name) for name in _VERSIONED}
     versions["python"] = platform.python_version()
     document = {key: value for key, value in scenario.document.items() if key != "flown"}
     document["seed"] = scenario.plan.seed
+    gains = document.get("gains", {})
+    document["gains"] = gains | scheme.gains(scenario.form, scenario.plan.gains.common)._asdict()
     document["flown"] = {
         "name": scenario.name,
         "form": scenario.form,

@@ -19,12 +19,15 @@ from rich.console import Console
 from rich.table import Table
 
 from ftcc.airside.autopilots import build, tick_of
+from ftcc.airside.flight_path import Own
 from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.scenario import load
+from ftcc.groundside.scenario import load, shipped
 from ftcc.groundside.simulate import fly, simulate
 
 FTCC = [sys.executable, "-m", "ftcc.groundside.cli"]
 REPEATS = 3
+FLIGHT = 300.0
+"""s."""
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -41,13 +44,16 @@ def median(action: Callable[[], object]) -> float:
 
 
 def in_one_process(table: Table, folder: Path) -> None:
-    """Simulations of the whole containment scenario."""
-    for form in ("flight", "monograph"):
-        mission = resolve(load("containment", form=form))
+    """Simulations of every shipped scenario, in its first form."""
+    for name in shipped():
+        mission = resolve(load(name, duration=FLIGHT))
         flown = median(partial(fly, mission))
-        table.add_row(f"simulate containment, {form}, 400 s", f"{flown:.2f} s", f"{400.0 / flown:.0f} x real time")
         recorded = median(partial(simulate_anew, mission, folder))
-        table.add_row("   the same with its recording", f"{recorded:.2f} s", "")
+        table.add_row(
+            f"simulate {name} {mission.form}, {len(mission.uavs)} vehicles, {FLIGHT:g} s",
+            f"{flown:.2f} s, recorded {recorded:.2f} s",
+            f"{FLIGHT / flown:.0f} x real time, recorded {FLIGHT / recorded:.0f} x",
+        )
 
 
 def simulate_anew(mission: Mission, folder: Path) -> None:
@@ -89,23 +95,44 @@ def run_anew(command: list[str], folder: Path) -> None:
     subprocess.run([*command, "--out", f"{tempfile.mkdtemp(dir=folder)}/run"], capture_output=True, check=True)
 
 
-def law_step() -> float:
-    """Time of one tick of one follower's law (two sub-steps), called from Python, s."""
-    mission = resolve(load("containment", form="flight"))
-    autopilots, inbox = build(mission.autopilots[:1], mission.timing)
-    autopilots.own[0, 3:5] = 1000.0, 30.0
-    step = partial(tick_of("containment").control, autopilots, inbox, 0, 0.01)
-    step()
-    return statistics.median(seconds(step) for _ in range(2000))
+def law_step(scenario: str) -> float:
+    """Time of one control period of a follower's law amid a flight, called from Python, s."""
+    mission = resolve(load(scenario, duration=0.2))
+    flight = fly(mission)
+    now = {name: flight.column(name, mission.uavs[0])[-1] for name in flight.names}
+    autopilots, inbox = build(mission.autopilots, mission.timing)
+    autopilots.own[0] = [now.get(name, 0.0) for name in Own._fields]
+    step = partial(tick_of(mission.scheme.name).control, autopilots, inbox, 0, mission.timing.period)
+    assert step(), "a command that is not finite"
+    return statistics.median(seconds(step) for _ in range(500))
 
 
 def laws(table: Table) -> None:
-    """One tick of the law, compiled and as plain Python."""
-    code = "from tests.bench.__main__ import law_step; print(law_step())"
-    for name, disable in (("compiled, called from Python", "0"), ("plain Python", "1")):
+    """One control period of every law, compiled and as plain Python."""
+    code = "import sys; from tests.bench.__main__ import law_step; print(*(law_step(name) for name in sys.argv[1:]))"
+    names = list(one_scenario_per_scheme())
+    measured = []
+    for disable in ("0", "1"):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": disable}
-        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
-        table.add_row(f"law of containment, {name}", f"{1e6 * float(run.stdout):.1f} us", "")
+        command = [sys.executable, "-c", code, *names]
+        run = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        measured.append([float(word) for word in run.stdout.split()])
+    for name, compiled, plain in zip(names, *measured, strict=True):
+        table.add_row(
+            f"one control period of {load(name).plan.scheme}, called from Python",
+            f"{1e6 * compiled:.1f} us, plain Python {1e6 * plain:.0f} us",
+            f"ratio {plain / compiled:.0f}",
+        )
+
+
+def one_scenario_per_scheme() -> dict[str, str]:
+    """A shipped scenario of every law that has one: scheme by scenario."""
+    found: dict[str, str] = {}
+    for name in shipped():
+        scheme = load(name).plan.scheme
+        if scheme not in found.values():
+            found[name] = scheme
+    return found
 
 
 def main() -> None:
@@ -117,7 +144,7 @@ def main() -> None:
         in_one_process(table, folder)
         start_up(table, folder)
         with_processes(table, folder)
-    Console(width=120).print(table)
+    Console(width=140).print(table)
 
 
 if __name__ == "__main__":

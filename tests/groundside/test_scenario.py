@@ -111,6 +111,18 @@ def test_a_switch_that_is_off_is_off_for_every_uav() -> None:
     assert {spec.gains[observers] for spec in mission.autopilots} == {0.0}
 
 
+@pytest.mark.parametrize("variants", [[], ["P", "off"]])
+def test_a_recorded_scenario_holds_every_gain_by_value_and_flies_with_the_same(
+    variants: list[str], tmp_path: Path
+) -> None:
+    mission = resolve(load("containment", form="flight", variants=variants, settings=["gains.uav.3.k11=3.5"]))
+    path = tmp_path / "scenario.toml"
+    path.write_text(mission.toml)
+    again = load(path)
+    assert set(again.plan.gains.common) == set(mission.scheme.gains_type._fields)
+    assert resolve(again).autopilots == mission.autopilots
+
+
 def test_a_cut_radio_and_a_cut_edge_become_changes_at_the_right_receivers() -> None:
     radio = resolve(load("containment", variants=["P", "cut_uav3_5s"]))
     events = {spec.uav: spec.link_events for spec in radio.autopilots if spec.link_events}
