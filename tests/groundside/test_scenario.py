@@ -29,7 +29,6 @@ def refused(name: str | Path, *fragments: str, **options: Any) -> None:
 def test_settings_come_after_variants_and_variants_after_the_form() -> None:
     plan = load("containment", variants=["P"]).plan
     assert plan.gains.common["k11"] == 7.3
-    assert plan.gains.common["shaper"] == 2.0
     assert plan.rates.control_rate == 200.0
     assert plan.rates.exchange_rate == 20.0
     plan = load("containment", variants=["P"], settings=["gains.k11=5", "faults.1.at=240.5", "scheme=other"]).plan
