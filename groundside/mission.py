@@ -266,6 +266,7 @@ def _aircraft(
         rate=_by_slot(plan.plant.rate_limits, plant),
         damping=_by_slot(plan.plant.damping, plant),
         delay=plan.plant.delay,
+        holds_first=isinstance(plan.plant.initial_actuators, dict),
         gust=_gust(plan, channels, findings),
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=actuator_faults(plan, uav),

@@ -242,7 +242,9 @@ class Plant(Strict):
     autothrottle: AutothrottleFields | None = None
     fault: Literal["after_lag", "before_lag"] = "after_lag"
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
-        "trim", description="position, and command in force before the first one arrives; N, rad"
+        "trim",
+        description="position, and command in force before the first one has come through; N, rad. With trim and a "
+        "delay the first command counts as all that came before it",
     )
     guards: Guards = Guards()
 

@@ -164,7 +164,7 @@ class Fleet(NamedTuple):
     delayed: NDArray[np.float64]
     """(k, d, 4): commands that wait for ``d`` further samples before they are in force, the oldest first."""
     waiting: NDArray[np.int64]
-    """(k,): 1 once the first of them has come."""
+    """(k,): 1 once the line holds commands: from the first one on, or from the start."""
     fault_before_lag: NDArray[np.float64]
     """(k,): 1 where a fault acts at the input of the lag, 0 where it acts on the position behind it."""
     faults: NDArray[np.float64]
@@ -279,7 +279,7 @@ def gust(fleet, i, time):
 def latch(fleet, i, command):
     """Bring ``command`` (4,) into force, or the one that came before it by the vehicle's delay.
 
-    The first one counts as all that came before it.
+    The first one counts as all that came before it, unless the line holds commands from the start.
     """
     line = fleet.delayed[i]
     last = line.shape[0] - 1

@@ -58,6 +58,8 @@ class VehicleSpec:
     """Of second-order actuators, below 1; 0 = first order."""
     delay: int = 0
     """Samples by which a command acts later than it has to."""
+    holds_first: bool = False
+    """Whether ``command`` stays in force for that delay; otherwise the first command received is in force at once."""
     gust: Gust = CALM
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
@@ -103,8 +105,8 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         rate=np.array([spec.rate for spec in specs], np.float64),
         damping=np.array([spec.damping for spec in specs], np.float64),
         speed=np.zeros((k, len(ACTUATORS))),
-        delayed=np.zeros((k, max(spec.delay for spec in specs), len(ACTUATORS))),
-        waiting=np.zeros(k, np.int64),
+        delayed=np.repeat(command[:, None, :], max(spec.delay for spec in specs), axis=1),
+        waiting=np.array([spec.holds_first for spec in specs], np.int64),
         gust_deviation=np.array([spec.gust.deviation for spec in specs], np.float64),
         gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),

@@ -142,3 +142,12 @@ def test_a_delayed_command_acts_that_many_samples_later_and_the_first_one_at_onc
         latch(fleet, 0, np.array([0.0, 1.0, 0.0, thrust]))
         acted.append(fleet.command[0, THRUST])
     assert acted == [10.0, 10.0, 10.0, 20.0, 30.0]
+
+
+def test_a_command_given_for_the_start_stays_in_force_for_the_delay():
+    fleet = build([point(delay=2, holds_first=True, command=(0.0, 0.0, 0.0, 5.0))])
+    acted = []
+    for thrust in (10.0, 20.0, 30.0):
+        latch(fleet, 0, np.array([0.0, 1.0, 0.0, thrust]))
+        acted.append(fleet.command[0, THRUST])
+    assert acted == [5.0, 5.0, 10.0]
