@@ -21,6 +21,8 @@ from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
+    CLAMPED,
+    FIRED,
     FROM_GROUND,
     PROFILE_PARAMETERS,
     PROFILE_STATES,
@@ -38,6 +40,7 @@ from ftcc.airside.spec import AutopilotSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS, SLOT, decode_command
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
+from ftcc.link.happenings import Happenings, drained, new_happenings, note
 from ftcc.link.modes import HOLD, MISSION
 from ftcc.link.timing import Timing
 
@@ -49,6 +52,7 @@ __all__ = [
     "sense",
     "sense_all",
     "tick_of",
+    "told",
 ]
 
 
@@ -94,7 +98,7 @@ class Autopilots(NamedTuple):
     offset: NDArray[np.float64]
     """(k,): lateral position, m."""
     profile: NDArray[np.float64]
-    """(k, 19): parameters of the leaders' profiles."""
+    """(k, 20): parameters of the leaders' profiles."""
     profile_commands: NDArray[np.float64]
     """(k, n, 3): their commands by time; unused rows have time inf. The last `FROM_GROUND` are the ground's."""
     profile_triggers: NDArray[np.float64]
@@ -111,6 +115,31 @@ class Autopilots(NamedTuple):
     """(k,): see `modes`."""
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
+    happenings: Happenings
+    """What is to be told, see `told`."""
+
+
+_PASSED, _HELD = 1, 2
+"""Kinds of happenings: a trigger fired (its number); the climb rate is held at its limit (1: up, 0: down)."""
+
+
+def told(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) -> list[tuple[int, int, str, str]]:
+    """What the autopilots noted since they were asked last: time us, UAV, severity, text."""
+    events = []
+    for at_us, i, kind, number in drained(autopilots.happenings):
+        profile = specs[i].profile
+        assert profile is not None
+        if kind == _PASSED:
+            trigger = profile.triggers[number]
+            text = (
+                f"leader commanded to {trigger.altitude:g} m, {trigger.speed:g} m/s: "
+                f"UAV {trigger.uav} has passed x = {trigger.x:g} m"
+            )
+            events.append((at_us, specs[i].uav, "info", text))
+        else:
+            way, limit = ("climb", profile.climb_limit) if number else ("sink", profile.sink_limit)
+            events.append((at_us, specs[i].uav, "warning", f"leader's {way} rate held at its limit of {limit:.2f} m/s"))
+    return events
 
 
 @functools.cache
@@ -225,6 +254,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
             mode=np.full(k, MISSION),
             held_us=np.zeros(k, np.int64),
+            happenings=new_happenings(),
         ),
         inbox,
     )
@@ -279,7 +309,12 @@ def lead(autopilots, inbox, i, now_us, period_us):
         commands = autopilots.profile_commands[i]
         seen = _position_of(autopilots, inbox, i, armed(triggers, state))
         clock = now_us - autopilots.held_us[i]
+        clamped, fired = state[CLAMPED], state[FIRED]
         refer(autopilots.profile[i], commands, triggers, state, reference, seen, clock, period_us)
+        if state[FIRED] > fired:
+            note(autopilots.happenings, now_us, i, _PASSED, int(fired))
+        if state[CLAMPED] > clamped:
+            note(autopilots.happenings, now_us, i, _HELD, int(reference[4] > 0.0))
     target = autopilots.target[i]
     target[0] = now_us / 1e6
     target[1], target[2], target[3] = reference[0], autopilots.offset[i], reference[3]

@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, build, sense_all, tick_of
+from ftcc.airside.autopilots import Autopilots, build, sense_all, tick_of, told
 from ftcc.airside.ground import GroundLink, Seat
 from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.neighbourhood import Neighbourhood
@@ -297,8 +297,11 @@ class Crew:
                 self.neighbourhood.publish(record)
 
     def report(self, tick: int, active: np.ndarray) -> None:
-        """A row of the recording, and telemetry to the ground."""
+        """What happened, a row of the recording, and telemetry to the ground."""
         now = self.now_us(tick)
+        if self.autopilots.happenings.used[0]:
+            for at_us, uav, severity, text in told(self.autopilots, self.specs):
+                self.gate.tell(Said(severity, text, uav, at_us))
         for i in _those(active):
             if not self.alive[i]:
                 continue

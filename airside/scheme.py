@@ -75,6 +75,7 @@ class Flight:
     leader_climb: float
     """Largest abs(climb rate) of the leaders' profiles, m/s."""
     leader_speed_varies: bool
+    """Whether a leader ever flies at another speed than the mission's, which followers know."""
     leader_acceleration: float = 0.0
     """Largest acceleration of the leaders' profiles along either axis, m/s^2."""
     initial: Mapping[int, Reference] = field(default_factory=dict)
@@ -104,6 +105,7 @@ _DEFAULTS: dict[str, Any] = {
     "FORMS": {"flight": {}},
     "SWITCHES": {},
     "check": lambda gains, flight: [],
+    "climb_limit": lambda gains: math.inf,
 }
 """What a file that does not say otherwise means."""
 
@@ -200,6 +202,11 @@ class Scheme:
     @property
     def shared_width(self) -> int:
         return max(len(row) for row in self.shared.values())
+
+    @property
+    def climb_limit(self) -> Callable[..., float]:
+        """Of some gains: the climb rate of a leader, m/s, that estimates can just follow."""
+        return self._declared("climb_limit")  # type: ignore[no-any-return]
 
     @property
     def check(self) -> Callable[..., list[Problem]]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.references.profiles import Profile, largest_acceleration, largest_climb
+from ftcc.airside.references.profiles import Profile, climb_range, largest_acceleration
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
@@ -247,7 +247,9 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
             if name not in plant.START and getattr(start, name) is not None:
                 findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
     for name in plant.COMPLETED:
-        if getattr(plan.noise, name) * plan.noise.factor > 0.0:
+        # Of pitch angle and angle of attack either may be the one that is measured.
+        instead = name == "alpha" and plan.noise.theta == 0.0
+        if getattr(plan.noise, name) * plan.noise.factor > 0.0 and not instead:
             findings.refuse(f"noise.{name}: follows from the other channels as measured; give those")
     channels = [name for name, _ in plant.DISTURBANCES]
     for n, disturbance in enumerate(plan.disturbances):
@@ -316,13 +318,14 @@ def check_scheme(
     speeds = {p.V for p in profiles.values()}
     speeds |= {command.speed for p in profiles.values() for command in p.commands}
     speeds |= {trigger.speed for p in profiles.values() for trigger in p.triggers}
+    known = {plan.mission.V} if plan.mission is not None else set()
     flight = Flight(
         graph=graph,
         period=timing.period,
         exchange_period=timing.exchange_us / 1e6,
         latency=timing.latency_us / 1e6,
-        leader_climb=largest_climb(profiles, plan.duration),
-        leader_speed_varies=len(speeds) > 1 or any(p.speed_wave for p in profiles.values()),
+        leader_climb=max((max(pair) for pair in climb_range(profiles, plan.duration).values()), default=0.0),
+        leader_speed_varies=bool(speeds - known) or any(p.speed_wave for p in profiles.values()),
         leader_acceleration=largest_acceleration(profiles, plan.duration),
         initial={vehicle.uav: _motion(vehicle) for vehicle in vehicles if vehicle.uav in graph.followers},
     )

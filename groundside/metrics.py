@@ -286,6 +286,13 @@ def _duration_above(t: Array, x: Array, threshold: float) -> float:
     return float((x >= threshold).sum()) * spacing
 
 
+def _rms_change(t: Array, x: Array, seconds: float) -> float:
+    spacing = float(t[1] - t[0]) if len(t) > 1 else math.inf
+    rows = max(1, round(seconds / spacing)) if spacing < math.inf else 1
+    change = x[rows:] - x[:-rows]
+    return float(np.sqrt((change * change).mean())) if len(change) else math.nan
+
+
 def _departure(t: Array, x: Array, seconds: float) -> float:
     return float(np.abs(x - x[t <= t[0] + seconds + _CLOSE].mean()).max())
 
@@ -318,6 +325,9 @@ METRICS = {
     ),
     "departure": Metric(
         _departure, "max", "largest distance from the mean over the window's first seconds, threshold of them", True
+    ),
+    "rms_change": Metric(
+        _rms_change, "max", "root mean square of the change in so many seconds, threshold of them", True
     ),
     "first_time": Metric(_first_time, "max", "time at which abs(x) first reaches the threshold, s", True),
     "duration_above": Metric(_duration_above, "max", "time for which x is at or above the threshold, s", True),

@@ -32,7 +32,7 @@ from ftcc.groundside.checks import (
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.faults import actuator_faults, fault_text, navigation_faults
 from ftcc.groundside.fire import check_posts
-from ftcc.groundside.leaders import profiles_of
+from ftcc.groundside.leaders import check_clearance, limited, profiles_of
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.run import LEADING
@@ -128,6 +128,9 @@ def resolve(scenario: Scenario) -> Mission:
     flight = None
     if gains:
         flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
+        estimates = min(scheme.climb_limit(gains[uav]) for uav in graph.followers)
+        profiles = limited(plan, profiles, sheet, limits[THRUST], estimates, findings)
+        check_clearance(plan, profiles, findings)
     tolerant = gains
     if plan.switches.get(FAULT_TOLERANCE) is False:
         tolerant = gains_of(scenario, scheme, findings, plan.switches | {FAULT_TOLERANCE: True})

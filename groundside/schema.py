@@ -349,7 +349,10 @@ class LeaderFields(Strict):
         "elsewhere that of the start",
     )
     forward: bool = Field(False, description="speeds are forward speeds instead of airspeeds")
-    climb_limit: float | None = Field(None, gt=0.0, description="m/s, largest climb rate of the profile")
+    climb_limit: float | None = Field(
+        None, gt=0.0, description="m/s, largest climb rate of the profile; default: what the followers can follow"
+    )
+    sink_limit: float | None = Field(None, gt=0.0, description="m/s, largest sink rate; default likewise")
 
 
 class AttitudeCommandFields(Strict):
@@ -472,7 +475,7 @@ class NoiseFields(Strict):
     gamma: float = Field(0.0, ge=0.0, description="rad")
     chi: float = Field(0.0, ge=0.0, description="rad")
     mu: float = Field(0.0, ge=0.0, description="rad")
-    alpha: float = Field(0.0, ge=0.0, description="rad")
+    alpha: float = Field(0.0, ge=0.0, description="rad; in the vertical plane either this or theta")
     beta: float = Field(0.0, ge=0.0, description="rad")
     theta: float = Field(0.0, ge=0.0, description="rad")
     p: float = Field(0.0, ge=0.0, description="rad/s")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.autopilots import build as build_autopilots
-from ftcc.airside.autopilots import tick_of
+from ftcc.airside.autopilots import tick_of, told
 from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_table
@@ -212,7 +212,7 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     while flown < end and not interrupted:
         try:
             loop.fly(*arrays, *constants, flown, min(end, flown + chunk))
-            events += _happened(mission, arrays[0])
+            events += _happened(mission, *arrays[:2])
             flown = min(end, flown + chunk)
             if progress is not None:
                 progress((flown - 1) * timing.period)
@@ -239,10 +239,12 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     )
 
 
-def _happened(mission: Mission, fleet: Any) -> list[tuple[float, int, str, str]]:
-    """What the vehicles have noted: time s, UAV, severity, text."""
-    told = [(at / 1e6, mission.uavs[i], number) for at, i, _, number in drained(fleet.happenings)]
-    return [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in told]
+def _happened(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:
+    """What vehicles and autopilots have noted: time s, UAV, severity, text."""
+    entries = [(at, mission.uavs[i], number) for at, i, _, number in drained(fleet.happenings)]
+    events = [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in entries]
+    events += told(autopilots, mission.autopilots)
+    return [(at / 1e6, uav, severity, text) for at, uav, severity, text in sorted(events)]
 
 
 def simulate(

@@ -13,7 +13,7 @@ from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, fields, fill, moved
 from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
+from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 
@@ -145,6 +145,9 @@ def conditions(fleet, i, time, out):
 def measure(fleet, i, tick, seed, true, out):
     """``true`` with the noise of vehicle ``i`` at this tick."""
     if add_noise(true, fleet.noise[i], seed, fleet.uav[i], tick, out):
+        if fleet.noise[i, ALPHA] > 0.0:
+            # An angle of attack that is measured itself: the pitch angle follows from it.
+            out[THETA] = out[GAMMA] + out[ALPHA]
         _complete(out)
 
 

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ftcc.sim.airframe import Airframe, longitudinal_rates
 
-__all__ = ["Trim", "TrimError", "trim"]
+__all__ = ["Trim", "TrimError", "steady_climb", "trim"]
 
 _SCALE = np.array([0.03, -0.2, 20.0])
 """Typical angle of attack, elevator and thrust: the unknowns are solved for as multiples of these."""
+_SCALE_CLIMB = np.array([0.03, -0.2, 0.1])
+"""Likewise angle of attack, elevator and flight-path angle."""
 
 _LARGEST_ALPHA = 0.8
 """Beyond this the polynomial airframe has solutions that no aircraft has, rad."""
@@ -65,3 +67,29 @@ def trim(airframe: Airframe, V: float, d1: float = 0.0, d2: float = 0.0, d3: flo
     if max(abs(rate) for rate in rates(found.x)) > 1e-9 or abs(solution.alpha) > _LARGEST_ALPHA:
         raise TrimError(f"the airframe has no level trim at {V:g} m/s with disturbances {d1:g}, {d2:g}, {d3:g}")
     return solution
+
+
+def steady_climb(airframe: Airframe, V: float, thrust: float) -> float:
+    """Climb rate (m/s, negative: sink rate) that ``thrust`` (N) holds at the constant airspeed ``V`` (m/s).
+
+    Solves (2.8), (2.10) and (2.12) with all rates and the pitch rate zero for angle of attack, elevator and path angle.
+
+    Raises
+    ------
+    TrimError
+        If there is none.
+    """
+    from scipy.optimize import root
+
+    def rates(unknown: NDArray[np.float64]) -> list[float]:
+        alpha, elevator, gamma = (float(value) for value in unknown * _SCALE_CLIMB)
+        V_dot, _, _, gamma_dot, _, q_dot = longitudinal_rates(
+            float(V), gamma, gamma + alpha, 0.0, float(thrust), elevator, 0.0, 0.0, 0.0, airframe
+        )
+        return [V_dot, gamma_dot, q_dot]
+
+    found = root(rates, np.array([1.0, 1.0, 0.0]), tol=1e-12)
+    alpha, _, gamma = (float(value) for value in found.x * _SCALE_CLIMB)
+    if max(abs(rate) for rate in rates(found.x)) > 1e-9 or abs(alpha) > _LARGEST_ALPHA:
+        raise TrimError(f"the airframe has no steady climb at {V:g} m/s with a thrust of {thrust:g} N")
+    return float(V * np.sin(gamma))

@@ -174,7 +174,8 @@ def _cannot_be_followed(link: GroundLink, altitude: float | None, speed: float |
     climb, varies = flight.leader_climb, flight.leader_speed_varies
     if altitude is not None:
         step = altitude - float(seat.autopilots.profile_state[seat.i, 1])
-        climb = max(climb, min(profile.climb_limit, climb_of_step(profile.altitude_filter, step)))
+        limit = profile.climb_limit if step > 0.0 else profile.sink_limit
+        climb = max(climb, min(limit, climb_of_step(profile.altitude_filter, step)))
     if speed is not None:
         varies = varies or speed != float(seat.autopilots.profile_state[seat.i, 3])
     asked = dataclasses.replace(flight, leader_climb=climb, leader_speed_varies=varies)

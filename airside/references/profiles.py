@@ -21,6 +21,7 @@ from ftcc.link.compiled import compiled
 
 __all__ = [
     "CLAMPED",
+    "FIRED",
     "FROM_GROUND",
     "PROFILE_PARAMETERS",
     "PROFILE_STATES",
@@ -32,9 +33,9 @@ __all__ = [
     "Trigger",
     "armed",
     "climb_of_step",
+    "climb_range",
     "command_from_ground",
     "largest_acceleration",
-    "largest_climb",
     "new_profile_state",
     "profile_arrays",
     "refer",
@@ -103,18 +104,22 @@ class Profile:
     """Speeds are forward speeds x' instead of airspeeds."""
     speed_wave: SpeedWave | None = None
     climb_limit: float = math.inf
-    """Largest abs(climb rate), m/s: what the followers can fly and estimate; the filter waits at it."""
+    """Largest climb rate, m/s: what the followers can fly and estimate; the altitude filter waits at it."""
+    sink_limit: float = math.inf
+    """Largest sink rate, m/s."""
 
 
 # Columns of the parameter vector of a profile.
 _Z_PHI, _V_PHI = 0, 4
 _Z_FREQUENCY, _Z_DAMPING, _V_FREQUENCY, _V_DAMPING = 8, 9, 10, 11
 _COSINE_AT, _COSINE_AMPLITUDE, _COSINE_FREQUENCY = 12, 13, 14
-_FORWARD, _WAVE_AMPLITUDE, _WAVE_FREQUENCY, _CLIMB_LIMIT = 15, 16, 17, 18
-PROFILE_PARAMETERS = 19
+_FORWARD, _WAVE_AMPLITUDE, _WAVE_FREQUENCY, _CLIMB_LIMIT, _SINK_LIMIT = 15, 16, 17, 18, 19
+PROFILE_PARAMETERS = 20
 
 # Columns of the state of a profile.
-_X, _Z, _Z_RATE, _V, _V_RATE, _FIRED = range(6)
+_X, _Z, _Z_RATE, _V, _V_RATE = range(5)
+FIRED = 5
+"""Column of the state: how many of the triggers have fired."""
 CLAMPED = 6
 """Column of the state: 1 while the climb rate is held at the profile's limit."""
 PROFILE_STATES = 7
@@ -130,7 +135,7 @@ _ROUNDING = 1e-6
 
 
 def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The profile as the compiled functions want it: parameters (19,) and commands (n, 3) with rows (at, z, V).
+    """The profile as the compiled functions want it: parameters (20,) and commands (n, 3) with rows (at, z, V).
 
     The last `FROM_GROUND` rows are free.
     """
@@ -152,7 +157,7 @@ def profile_arrays(profile: Profile, period: float) -> tuple[NDArray[np.float64]
     if profile.speed_wave is not None:
         parameters[_WAVE_AMPLITUDE] = profile.speed_wave.amplitude
         parameters[_WAVE_FREQUENCY] = profile.speed_wave.frequency
-    parameters[_CLIMB_LIMIT] = profile.climb_limit
+    parameters[_CLIMB_LIMIT], parameters[_SINK_LIMIT] = profile.climb_limit, profile.sink_limit
     rows = [(-math.inf, profile.z, profile.V)] + [(c.at, c.altitude, c.speed) for c in profile.commands]
     return parameters, np.array(rows + [(math.inf, math.inf, math.inf)] * FROM_GROUND)
 
@@ -184,7 +189,7 @@ def new_profile_state(profile: Profile) -> NDArray[np.float64]:
 @compiled
 def armed(triggers, state):  # type: ignore[no-untyped-def]
     """In-edge of the leader whose position the next trigger waits for; -1: the own position, -2: none is left."""
-    n = int(state[_FIRED])
+    n = int(state[FIRED])
     return int(triggers[n, 0]) if n < triggers.shape[0] and triggers[n, 1] < math.inf else -2
 
 
@@ -194,7 +199,7 @@ def _command(commands, triggers, state, time):  # type: ignore[no-untyped-def]
     for n in range(commands.shape[0]):
         if commands[n, 0] <= time:
             latest = n
-    fired = int(state[_FIRED])
+    fired = int(state[FIRED])
     if fired > 0 and latest < commands.shape[0] - FROM_GROUND:
         return triggers[fired - 1, 2], triggers[fired - 1, 3]
     return commands[latest, 1], commands[latest, 2]
@@ -224,13 +229,14 @@ def _cosine(parameters, time):  # type: ignore[no-untyped-def]
 
 @compiled
 def _climb_filtered(parameters, state, altitude, falling, period):  # type: ignore[no-untyped-def]
-    """Advance the altitude filter; its rate less that of the cosine (``falling``) obeys the limit."""
+    """Advance the altitude filter; its rate less that of the cosine (``falling``) obeys the limits."""
     before = state[_Z]
     state[_Z], state[_Z_RATE] = _filtered(parameters, _Z_PHI, state[_Z], state[_Z_RATE], altitude)
-    limit = parameters[_CLIMB_LIMIT]
+    climb = state[_Z_RATE] - falling
+    allowed = min(max(climb, -parameters[_SINK_LIMIT]), parameters[_CLIMB_LIMIT])
     state[CLAMPED] = 0.0
-    if abs(state[_Z_RATE] - falling) > limit:
-        state[_Z_RATE] = falling + (limit if state[_Z_RATE] > falling else -limit)
+    if climb != allowed:
+        state[_Z_RATE] = falling + allowed
         state[_Z] = before + state[_Z_RATE] * period
         state[CLAMPED] = 1.0
 
@@ -267,8 +273,8 @@ def refer(parameters, commands, triggers, state, reference, seen, now_us, period
     edge = armed(triggers, state)
     if edge == -1:
         seen = state[_X]
-    if edge >= -1 and seen >= triggers[int(state[_FIRED]), 1] - _ROUNDING:
-        state[_FIRED] += 1.0
+    if edge >= -1 and seen >= triggers[int(state[FIRED]), 1] - _ROUNDING:
+        state[FIRED] += 1.0
     altitude, speed = _command(commands, triggers, state, now)
     w, damping = parameters[_Z_FREQUENCY], parameters[_Z_DAMPING]
     z_ddot = w * w * (altitude - state[_Z]) - 2.0 * damping * w * state[_Z_RATE]
@@ -356,9 +362,11 @@ def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> 
     return rows
 
 
-def largest_climb(profiles: Mapping[int, Profile], duration: float) -> float:
-    """Largest abs(climb rate) of the leaders' profiles, m/s, on a grid of 0.1 s."""
-    return max((float(np.abs(row[:, 4]).max()) for row in sampled(profiles, duration, 0.1).values()), default=0.0)
+def climb_range(profiles: Mapping[int, Profile], duration: float) -> dict[int, tuple[float, float]]:
+    """Largest sink rate and largest climb rate of each leader's profile, m/s, on a grid of 0.1 s."""
+    return {
+        uav: (float(-row[:, 4].min()), float(row[:, 4].max())) for uav, row in sampled(profiles, duration, 0.1).items()
+    }
 
 
 def largest_acceleration(profiles: Mapping[int, Profile], duration: float) -> float:

@@ -320,6 +320,11 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
     )
 
 
+def climb_limit(gains: Gains) -> float:
+    """Climb rate of a leader, m/s, that the estimates can just follow: that of the observer, that of the shaper."""
+    return min(gains.beta2, gains.v_max) if gains.shaper > 0.0 else gains.beta2
+
+
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(gains, "k11 k12 k21 k31 k41 k51 k22 k42 k52 e1 e2 l1 l2 beta1 phi")
@@ -327,7 +332,9 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
         return [*problems, Problem(True, f"gain substeps = {gains.substeps}: must be a whole number >= 1")]
     problems += above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")
     if flight.leader_speed_varies:
-        problems.append(Problem(True, "the leaders' speed must be constant: followers know it as a mission constant"))
+        problems.append(
+            Problem(True, "the leaders' speed must be constant and the mission's, as which followers know it")
+        )
     h = flight.period / gains.substeps
     degree = largest_degree(flight)
     rates = {

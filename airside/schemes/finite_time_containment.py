@@ -427,12 +427,4 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 "below 125 Hz (100 Hz with gain prediction = 1)",
             )
         )
-    if flight.leader_climb > 2.6:
-        problems.append(
-            Problem(
-                False,
-                f"the leaders climb or sink with {flight.leader_climb:.2f} m/s: at 30 m/s the thrust limits of the "
-                "reference airframe allow 4.7 m/s up and 2.6 m/s down, beyond which the forward position is lost",
-            )
-        )
     return problems

@@ -401,6 +401,11 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
     return (state.z_d, z_r, z_h, *tube, *state[1:7], output.unexplained, output.elevator_wanted)
 
 
+def climb_limit(gains: Gains) -> float:
+    """Climb rate of the leader, m/s, that the estimates can just follow: that of the observer, and its limit."""
+    return min(gains.beta2, gains.observer_limit) if gains.observer_limit > 0.0 else gains.beta2
+
+
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(
@@ -421,7 +426,9 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     if gains.observer_limit > 0.0:
         problems += above_leaders_climb(gains, "observer_limit", flight, "or the estimate cannot follow")
     if flight.leader_speed_varies:
-        problems.append(Problem(True, "the leader's speed must be constant: followers know it as a mission constant"))
+        problems.append(
+            Problem(True, "the leader's speed must be constant and the mission's, as which followers know it")
+        )
     if gains.in_flight == 0.0:
         low, high = -gains.kl * gains.tube_first, gains.ku * gains.tube_first
         for uav, initial in flight.initial.items():

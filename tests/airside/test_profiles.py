@@ -16,7 +16,7 @@ from ftcc.airside.references.profiles import (
     SpeedWave,
     Trigger,
     armed,
-    largest_climb,
+    climb_range,
     new_profile_state,
     profile_arrays,
     refer,
@@ -80,7 +80,7 @@ def test_leader_7_stands_where_the_monograph_has_it():
     """Reference: 1099.53 m at 125 s; the largest climb rate of the scenario is 1.970 m/s."""
     t, rows = motion(profile(7), 400.0)
     assert rows[np.argmin(np.abs(t - 125.0)), Z] == pytest.approx(1099.53, abs=0.005)
-    assert largest_climb({7: profile(7), 8: profile(8)}, 400.0) == pytest.approx(1.970, abs=5e-4)
+    assert max(map(max, climb_range({7: profile(7), 8: profile(8)}, 400.0).values())) == pytest.approx(1.970, abs=5e-4)
 
 
 def test_forward_distance_is_the_integral_of_the_forward_speed():
@@ -125,7 +125,7 @@ def test_commands_follow_each_other():
 
 
 def test_climb_is_held_at_its_limit_and_the_height_still_reached():
-    t, rows = motion(Profile(0.0, 1000.0, 30.0, (Command(5.0, 1100.0, 30.0),), climb_limit=1.0), 400.0)
+    t, rows = motion(Profile(0.0, 1000.0, 30.0, (Command(5.0, 1100.0, 30.0),), climb_limit=1.0, sink_limit=1.0), 400.0)
     assert np.abs(rows[:, Z_DOT]).max() == 1.0
     assert rows[-1, Z] == pytest.approx(1100.0, abs=0.01)
     held = (t[1:] > 30.0) & (rows[1:, Z_DOT] == 1.0)
@@ -133,14 +133,21 @@ def test_climb_is_held_at_its_limit_and_the_height_still_reached():
     assert np.diff(rows[:, Z])[held] == pytest.approx(0.01)
 
 
+def test_climbs_and_descents_have_limits_of_their_own():
+    there_and_back = (Command(0.0, 1100.0, 30.0), Command(200.0, 1000.0, 30.0))
+    rows = motion(Profile(0.0, 1000.0, 30.0, there_and_back, climb_limit=1.5, sink_limit=0.75), 600.0)[1]
+    assert (rows[:, Z_DOT].max(), rows[:, Z_DOT].min()) == (1.5, -0.75)
+    assert rows[-1, Z] == pytest.approx(1000.0, abs=0.01)
+
+
 def test_the_limit_counts_the_cosine_too():
     climb, sinking = (Command(0.0, 1100.0, 30.0),), Cosine(0.0, 60.0, 0.02)
-    rows = motion(Profile(0.0, 1000.0, 30.0, climb, cosine=sinking, climb_limit=1.0), 200.0)[1]
+    rows = motion(Profile(0.0, 1000.0, 30.0, climb, cosine=sinking, climb_limit=1.0, sink_limit=1.0), 200.0)[1]
     assert np.abs(rows[:, Z_DOT]).max() <= 1.0 + 1e-12
 
 
 def test_a_clamped_climb_is_reported():
-    steep = Profile(0.0, 1000.0, 30.0, (Command(0.0, 1100.0, 30.0),), climb_limit=1.0)
+    steep = Profile(0.0, 1000.0, 30.0, (Command(0.0, 1100.0, 30.0),), climb_limit=1.0, sink_limit=1.0)
     arrays, triggers = profile_arrays(steep, 0.1), trigger_rows(steep, 7, [])
     state, reference, clamped = new_profile_state(steep), np.zeros(len(Reference._fields)), []
     for k in range(4000):

@@ -47,6 +47,67 @@ def test_an_obstacle_detected_over_another_one_does_not_let_the_leaders_sink_bet
     ]
 
 
+def limits(scenario: str, **options: Any) -> tuple[float, float]:
+    """Climb and sink limit of the leaders, which are the same for all of them."""
+    profiles = [spec.profile for spec in resolve(load(scenario, **options)).autopilots]
+    (both,) = {(profile.climb_limit, profile.sink_limit) for profile in profiles if profile}
+    return both
+
+
+def test_leaders_climb_and_sink_no_faster_than_the_followers_thrust_holds() -> None:
+    assert limits("finite_time_containment") == pytest.approx((0.99 * 4.7595, 0.99 * 2.6059), rel=1e-4)
+
+
+def test_leaders_climb_no_faster_than_the_followers_estimates_follow() -> None:
+    """The shaper of the flight form is limited to 2.5 m/s; without it the observer follows 3 m/s."""
+    assert limits("containment") == pytest.approx((0.99 * 2.2954, 0.95 * 2.5), rel=1e-4)
+    assert limits("containment", settings=["gains.uav.3.beta2=2.2"]) == pytest.approx((0.95 * 2.2, 0.95 * 2.2))
+
+
+def test_a_limit_that_the_scenario_states_is_taken() -> None:
+    settings = ["leaders.5.climb_limit=2.0", "leaders.6.climb_limit=2.0", "leaders.5.sink_limit=9.0"]
+    found = limits("finite_time_containment", settings=[*settings, "leaders.6.sink_limit=9.0"])
+    assert found == (2.0, 9.0)
+
+
+STEEP = ["leaders.5.altitude_filter.frequency=0.1", "leaders.6.altitude_filter.frequency=0.1", "claims=[]"]
+
+
+def test_a_profile_beyond_the_limits_is_held_with_a_warning_and_an_event(tmp_path: Path) -> None:
+    flown = mission(
+        settings=[*STEEP, "obstacles.0.x=[1160.0, 1200.0]", "obstacles.1.x=[9000.0, 9100.0]"], duration=60.0
+    )
+    assert "leaders.5: its profile sinks with 2.65 m/s; the followers' thrust holds 2.61 m/s" in flown.warnings[0]
+    assert "it is held at 2.58 m/s" in flown.warnings[0]
+    run = simulate(flown, tmp_path / "run")
+    told = [(event["uav"], event["severity"], event["text"]) for event in run.events if "leader" in event["text"]]
+    for uav, up, down in ((5, 580, 500), (6, 480, 400)):
+        assert [one for one in told if one[0] == uav] == [
+            (uav, "info", f"leader commanded to {up} m, 30 m/s: UAV 6 has passed x = 160 m"),
+            (uav, "info", f"leader commanded to {down} m, 30 m/s: UAV 5 has passed x = 1200 m"),
+            (uav, "warning", "leader's sink rate held at its limit of 2.58 m/s"),
+        ]
+        assert np.diff(run.column("z", uav)).min() / 0.01 == pytest.approx(-2.58, abs=0.01)
+
+
+def test_a_steep_profile_on_demand_comes_with_a_warning() -> None:
+    warnings = mission(variants=["steep"]).warnings
+    assert len(warnings) == 2
+    assert all("they will lose the leaders" in warning for warning in warnings)
+
+
+def test_a_leader_whose_profile_does_not_clear_an_obstacle_is_warned_about() -> None:
+    (warning,) = mission(settings=["obstacles.0.top=500.0"]).warnings
+    assert "leaders.6: its profile passes obstacle 1 down to" in warning
+
+
+def test_another_speed_than_the_missions_is_refused_where_followers_do_not_hear_it() -> None:
+    with pytest.raises(ScenarioError, match="the leaders' speed must be constant"):
+        resolve(load("containment", settings=["leaders.7.V=28.0", "leaders.8.V=28.0"]))
+    both = ["leaders.5.V=28.0", "leaders.6.V=28.0"]
+    assert mission(settings=both).warnings == ()
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [

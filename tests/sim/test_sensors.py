@@ -153,6 +153,14 @@ def test_measured_angle_of_attack_is_measured_pitch_minus_measured_flight_path_a
     assert alpha.std() == pytest.approx(0.002 * math.sqrt(2.0), rel=0.07)
 
 
+def test_an_angle_of_attack_measured_itself_leaves_the_pitch_angle_to_follow():
+    errors = measured(noise(gamma=0.002, alpha=0.002), 2000)
+    gamma, alpha, theta = (errors[:, TRUTH.index(name)] for name in ("gamma", "alpha", "theta"))
+    assert theta == pytest.approx(gamma + alpha, abs=1e-12)
+    assert alpha.std() == pytest.approx(0.002, rel=0.07)
+    assert abs(np.corrcoef(gamma, alpha)[0, 1]) < 4.5 / math.sqrt(2000)
+
+
 def test_noise_belongs_to_seed_uav_and_tick():
     sizes = noise(V=0.05, z=0.1, gamma=0.002, theta=0.002, q=0.005)
     assert np.array_equal(measured(sizes, 20), measured(sizes, 20))

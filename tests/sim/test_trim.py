@@ -9,7 +9,7 @@ import pytest
 
 import ftcc.groundside
 from ftcc.sim.airframe import Airframe, longitudinal_rates
-from ftcc.sim.trim import TrimError, trim
+from ftcc.sim.trim import TrimError, steady_climb, trim
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +58,18 @@ def test_trim_under_the_disturbances_of_chapter_5_is_an_equilibrium(airframe: Ai
 def test_no_trim_where_the_lift_cannot_carry_the_weight(airframe: Airframe) -> None:
     with pytest.raises(TrimError, match="no level trim at 5 m/s"):
         trim(airframe, 5.0)
+
+
+def test_thrust_of_level_trim_holds_the_altitude(airframe: Airframe) -> None:
+    assert steady_climb(airframe, 30.0, trim(airframe, 30.0).thrust) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("thrust", "climb"), [(60.0, 4.7), (0.0, -2.6)])
+def test_what_the_thrust_limits_of_chapter_6_allow(airframe: Airframe, thrust: float, climb: float) -> None:
+    """Reference section 2: sustained climb of 4.7 m/s, descent of 2.6 m/s at 30 m/s."""
+    assert steady_climb(airframe, 30.0, thrust) == pytest.approx(climb, abs=0.1)
+
+
+def test_a_thrust_that_no_path_angle_balances(airframe: Airframe) -> None:
+    with pytest.raises(TrimError, match="no steady climb"):
+        steady_climb(airframe, 30.0, 2000.0)

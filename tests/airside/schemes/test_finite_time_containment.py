@@ -167,11 +167,10 @@ def test_infinite_time_variant_is_allowed():
     assert fatal(**SCHEME.switches["finite_time"]) == ""
 
 
-def test_slow_control_and_steep_leaders_are_warned_about():
-    slow = LAW.check(SCHEME.gains("flight", {"substeps": 10.0}), flight(GRAPH, 0.01, leader_climb=3.7))
-    assert [p.fatal for p in slow] == [False, False]
-    assert "limit-cycles" in slow[0].text
-    assert "2.6 m/s down" in slow[1].text
+def test_slow_control_is_warned_about():
+    (slow,) = LAW.check(SCHEME.gains("flight", {"substeps": 10.0}), flight(GRAPH, 0.01))
+    assert not slow.fatal
+    assert "limit-cycles" in slow.text
     predicted = LAW.check(SCHEME.gains("flight", {"substeps": 10.0, "prediction": 1.0}), flight(GRAPH, 0.01))
     assert predicted == []
 
