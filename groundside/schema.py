@@ -491,6 +491,7 @@ class Claim(Strict):
     signal: str = Field(description="arithmetic expression over columns of the recording")
     uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
     window: tuple[float, float] = Field(description="s, both ends included")
+    within: list[tuple[float, float]] = Field([], description="s, parts of the window that alone count; default: all")
     threshold: float | dict[str, float] | None = Field(None, description="for the metrics that need one; by case")
     unit: str = ""
     source: str
@@ -503,6 +504,9 @@ class Claim(Strict):
     def _window_in_order(self) -> Self:
         if self.window[1] < self.window[0]:
             raise ValueError(f"window = {list(self.window)}: must not end before it begins")
+        for part in self.within:
+            if not self.window[0] <= part[0] <= part[1] <= self.window[1]:
+                raise ValueError(f"within = {list(part)}: must be a part of window = {list(self.window)}")
         return self
 
 

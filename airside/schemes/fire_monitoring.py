@@ -134,9 +134,9 @@ SHARED = {
     )
 }
 SIGNALS = (
-    Q("x_d", "m", "reference, north"),
-    Q("y_d", "m", "reference, east"),
-    Q("z_d", "m", "reference, altitude"),
+    Q("x_ref", "m", "reference, north"),
+    Q("y_ref", "m", "reference, east"),
+    Q("z_ref", "m", "reference, altitude"),
     *_ERROR,
     Q("e_x", "m", "cooperative error, north"),
     Q("e_y", "m", "cooperative error, east"),
@@ -147,7 +147,7 @@ SIGNALS = (
     Q("Dhat_x", "m/s^2", "estimated lumped disturbance, north"),
     Q("Dhat_y", "m/s^2", "estimated lumped disturbance, east"),
     Q("Dhat_z", "m/s^2", "estimated lumped disturbance, up"),
-    Q("V_d", "m/s", "speed of the reference"),
+    Q("V_ref", "m/s", "speed of the reference"),
     Q("fire_north", "m", "centre of the formation, north"),
     Q("fire_east", "m", "centre of the formation, east"),
 )

@@ -1,0 +1,231 @@
+"""The 6-DoF aircraft, eqs. (2.1)-(2.7), under its own inner loop: thrust, load factor and bank are demanded of it.
+
+Motion over the ground in true wind: forces are those of the air velocity. Faults act on the three demands, ahead of the
+loop (`ftcc.sim.inner_loop`); the surfaces behind it have a lag, a rate limit and stops of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ftcc.link.compiled import compiled
+from ftcc.sim.airframe import Airframe, attitude_rates
+from ftcc.sim.inner_loop import LoopState, deflections, load_factor, loop_rates
+from ftcc.sim.plant import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    CHI,
+    CLIMB,
+    GAMMA,
+    INCIDENCE,
+    MU,
+    NUMBER,
+    SIDESLIP,
+    P,
+    Q,
+    R,
+    V,
+    X,
+    Y,
+    Z,
+)
+from ftcc.sim.plants.attitude import COMPLETED, complete
+from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Disturbances, Inputs, wind_speed
+from ftcc.sim.trim import trim
+
+__all__ = [
+    "ACTUATORS",
+    "COMPLETED",
+    "DISTURBANCES",
+    "SERVES",
+    "START",
+    "Disturbances",
+    "Inputs",
+    "Parameters",
+    "State",
+    "airspeed",
+    "complete",
+    "initial",
+    "level",
+    "lost",
+    "rates",
+    "truth",
+]
+
+Parameters = Airframe
+START = ("V", "x", "y", "z", "gamma", "chi")
+
+_SURFACE_LAG = 20.0
+"""Bandwidth of the surfaces, rad/s."""
+_SURFACE_RATE = 4.0
+"""rad/s."""
+_SURFACE_STOP = math.radians(30.0)
+
+
+class State(NamedTuple):
+    """Motion over the ground, surfaces and inner loop."""
+
+    x: float
+    """North, m."""
+    y: float
+    """East, m."""
+    z: float
+    """Up, m."""
+    vx: float
+    """m/s."""
+    vy: float
+    vz: float
+    q0: float
+    """Attitude, body to north-east-down."""
+    q1: float
+    q2: float
+    q3: float
+    p: float
+    """Body rates, rad/s."""
+    q: float
+    r: float
+    aileron: float
+    """Surfaces, rad."""
+    elevator: float
+    rudder: float
+    n_r: float
+    """Inner loop, see `LoopState`."""
+    n_r_dot: float
+    mu_r: float
+    integral: float
+
+
+class Level(NamedTuple):
+    """Level flight in still air."""
+
+    alpha: float
+    """rad."""
+    elevator: float
+    """rad."""
+    thrust: float
+    """N."""
+    load_factor: float
+    bank: float
+    """rad."""
+
+
+@compiled
+def _against(s, vx, vy, vz):
+    """Speed, path angle, course, bank, angle of attack and sideslip of the attitude against a velocity (z up)."""
+    ground = math.sqrt(vx * vx + vy * vy)
+    speed = math.sqrt(ground * ground + vz * vz)
+    gamma, chi = math.atan2(vz, ground), math.atan2(vy, vx)
+    q0, q1, q2, q3 = s.q0, s.q1, s.q2, s.q3
+    # Columns of the rotation from body to north-east-down: nose, right wing, belly.
+    nose = (q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2.0 * (q1 * q2 + q0 * q3), 2.0 * (q1 * q3 - q0 * q2))
+    wing = (2.0 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2.0 * (q2 * q3 + q0 * q1))
+    belly = (2.0 * (q1 * q3 + q0 * q2), 2.0 * (q2 * q3 - q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3)
+    u = nose[0] * vx + nose[1] * vy - nose[2] * vz
+    v = wing[0] * vx + wing[1] * vy - wing[2] * vz
+    w = belly[0] * vx + belly[1] * vy - belly[2] * vz
+    alpha, beta = math.atan2(w, u), math.atan2(v, math.sqrt(u * u + w * w))
+    sideways = wing[1] * math.cos(chi) - wing[0] * math.sin(chi)
+    downwards = wing[2] * math.cos(gamma) + math.sin(gamma) * (wing[0] * math.cos(chi) + wing[1] * math.sin(chi))
+    return speed, gamma, chi, math.atan2(downwards, sideways), alpha, beta
+
+
+@compiled
+def _surface_rate(wanted, position):
+    stopped = min(max(wanted, -_SURFACE_STOP), _SURFACE_STOP)
+    return min(max(_SURFACE_LAG * (stopped - position), -_SURFACE_RATE), _SURFACE_RATE)
+
+
+@compiled
+def rates(s, u, d, a):
+    """Rates of `State` under the demands ``u`` and disturbances ``d`` of the airframe ``a``; the wind blows north."""
+    thrust = max(u.thrust, 0.0)
+    speed, gamma, chi, mu, alpha, beta = _against(s, s.vx - wind_speed(s.z, d.wind, d.gust), s.vy, s.vz)
+    V_dot, chi_dot, gamma_dot, _, _, _, p_dot, q_dot, r_dot = attitude_rates(
+        speed, gamma, mu, alpha, beta, s.p, s.q, s.r, s.aileron, s.elevator, s.rudder, thrust, 0.0, 0.0, 0.0, a
+    )
+    # The rates of the air path in still air are the acceleration on its triad, whatever the wind does.
+    right, up = speed * math.cos(gamma) * chi_dot, speed * gamma_dot
+    cg, sg, cc, sc = math.cos(gamma), math.sin(gamma), math.cos(chi), math.sin(chi)
+    loop = LoopState(s.n_r, s.n_r_dot, s.mu_r, s.integral)
+    n_r, n_r_dot, mu_r, integral = loop_rates(
+        loop, u.load_factor, u.bank, load_factor(speed, alpha, s.elevator, thrust, a)
+    )
+    aileron, elevator, rudder = deflections(
+        loop, mu_r, speed, gamma, mu, alpha, beta, s.p, s.q, s.r, chi_dot, gamma_dot, s.elevator, thrust, a
+    )
+    return (
+        s.vx,
+        s.vy,
+        s.vz,
+        V_dot * cg * cc - right * sc - up * sg * cc + d.b_x,
+        V_dot * cg * sc + right * cc - up * sg * sc + d.b_y,
+        V_dot * sg + up * cg + d.b_z,
+        0.5 * (-s.q1 * s.p - s.q2 * s.q - s.q3 * s.r),
+        0.5 * (s.q0 * s.p + s.q2 * s.r - s.q3 * s.q),
+        0.5 * (s.q0 * s.q - s.q1 * s.r + s.q3 * s.p),
+        0.5 * (s.q0 * s.r + s.q1 * s.q - s.q2 * s.p),
+        p_dot,
+        q_dot,
+        r_dot,
+        _surface_rate(aileron, s.aileron),
+        _surface_rate(elevator, s.elevator),
+        _surface_rate(rudder, s.rudder),
+        n_r,
+        n_r_dot,
+        mu_r,
+        integral,
+    )
+
+
+@compiled
+def airspeed(s):
+    """Speed over the ground, m/s."""
+    return math.sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz)
+
+
+@compiled
+def truth(s, u, offset, out):
+    """Write the channels of ``plant.TRUTH`` that are states; all angles are against the velocity over the ground."""
+    out[X], out[Y], out[Z] = s.x, s.y, s.z
+    out[V], out[GAMMA], out[CHI], out[MU], out[ALPHA], out[BETA] = _against(s, s.vx, s.vy, s.vz)
+    out[P], out[Q], out[R] = s.p, s.q, s.r
+
+
+@compiled
+def lost(s, guards):
+    """Why a vehicle in this state is lost, a key of ``plant.LOST``; 0 if it is not."""
+    speed, gamma, _, _, alpha, beta = _against(s, s.vx, s.vy, s.vz)
+    if not (speed + abs(s.p) + abs(s.q) + abs(s.r) + abs(alpha) + abs(beta) < math.inf):
+        return NUMBER
+    if guards.least_airspeed > speed:
+        return AIRSPEED
+    if abs(gamma) > guards.flight_path_angle:
+        return CLIMB
+    if abs(alpha) > guards.angle_of_attack:
+        return INCIDENCE
+    if abs(beta) > guards.sideslip:
+        return SIDESLIP
+    return 0
+
+
+def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
+    """`State` of an aircraft that starts as ``start`` says, with level wings in the trim of `level`."""
+    speed, gamma, chi = start["V"], start.get("gamma", 0.0), start.get("chi", 0.0)
+    ground, pitch = speed * math.cos(gamma), gamma + steady["alpha"]
+    cy, sy, cp, sp = math.cos(0.5 * chi), math.sin(0.5 * chi), math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    return State(
+        start.get("x", 0.0), start.get("y", 0.0), start["z"],
+        ground * math.cos(chi), ground * math.sin(chi), speed * math.sin(gamma),
+        cy * cp, -sy * sp, cy * sp, sy * cp,
+        0.0, 0.0, 0.0,
+        0.0, steady["elevator"], 0.0,
+        1.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
+
+
+def level(airframe: Airframe, V: float, **disturbances: float) -> Level:
+    """Level flight at ``V`` (m/s) in still air, whatever disturbs; raises TrimError where there is none."""
+    return Level(*trim(airframe, V), 1.0, 0.0)
