@@ -178,9 +178,8 @@ def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float)
         t = signals.column("t", uav)
         if len(t) == 0 or t[-1] < claim.window[1] - 1e-6:
             return result(None, False, f"UAV {uav} was lost")
-        rows = window_of(t, claim.window)
-        if claim.within:
-            rows = np.concatenate([np.arange(len(t))[window_of(t, part)] for part in claim.within])
+        parts = claim.within or [claim.window]
+        rows = np.concatenate([np.arange(len(t))[window_of(t, part)] for part in parts])
         x = evaluated(claim.signal, signals, graph, uav)[rows]
         if len(x) == 0:
             return result(None, None, "no row in the window")

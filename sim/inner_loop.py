@@ -1,4 +1,4 @@
-"""The vehicle's own inner loop: flies load factor and bank with the surfaces of the 6-DoF aircraft (not in the monograph).
+"""The vehicle's own inner loop: load factor and bank by the surfaces of the 6-DoF aircraft (not in the monograph).
 
 Shaped demands, an integral on the measured load factor, the kinematics (2.3) inverted for body rates, the moments
 (2.4)-(2.7) inverted for surfaces. Damping and stiffness terms are fed with the commanded angle of attack and rates: to
