@@ -17,11 +17,9 @@ from ftcc.groundside.launcher import Outcome, Swarm
 from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.registry import Card, Control, Entry
 from ftcc.groundside.snapshot import Event
-from ftcc.link.actuators import in_slots
 from ftcc.link.ground import LISTENERS, Address
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
-from ftcc.sim.plants import find
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
@@ -261,17 +259,10 @@ def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> An
     recording = options.folder / "swarm.rrd" if options.record_view else None
     if options.viewer == "none" and recording is None:
         return None
-    from ftcc.groundside.dashboard import Dashboard
+    from ftcc.groundside.dashboard import Dashboard, Subject
 
-    follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
-    limits = dict(zip(in_slots(find(mission.plant).ACTUATORS), follower.limits, strict=True))
     return Dashboard(
-        title=mission.title,
-        graph=mission.graph,
-        signals=mission.scheme.signals,
-        limits=limits,
-        leaders=mission.graph.leaders,
-        followers=mission.graph.followers,
+        Subject.of(mission),
         recording=recording,
         viewer=options.viewer,
         ports=ports.viewer,

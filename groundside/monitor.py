@@ -12,6 +12,8 @@ from types import ModuleType
 from typing import Any
 
 from ftcc.airside.ground import LINK_FIELDS
+from ftcc.airside.ground.modes import NAMES as MODES
+from ftcc.airside.ground.modes import mode_of
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.link.mavlink import STATION, Endpoint
 from ftcc.sim.plant import TRUTH
@@ -29,6 +31,7 @@ class _Heard:
     truth: dict[str, float] = field(default_factory=dict)
     signals: dict[str, float] = field(default_factory=dict)
     links: dict[int, LinkState] = field(default_factory=dict)
+    mode: str = ""
     heartbeat: float = -math.inf
     """Wall time of the last HEARTBEAT (monotonic, s)."""
 
@@ -96,6 +99,8 @@ class Monitor:
                 heard.links = _links(message.data)
         elif kind == "HEARTBEAT":
             heard.heartbeat = time.monotonic()
+            mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
+            heard.mode = MODES.get(mode, "") if mode is not None else ""
 
     @property
     def strangers(self) -> int:
@@ -131,6 +136,7 @@ def _state(heard: _Heard, plant: ModuleType) -> UavState:
         disturbances={name: truth[name] for name, _ in plant.DISTURBANCES},
         signals=heard.signals,
         links=heard.links,
+        mode=heard.mode,
         late=int(truth["late"]),
     )
 

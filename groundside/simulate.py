@@ -267,7 +267,7 @@ def record(flight: Flight, folder: Path) -> Run:
     events = EventLog(folder / "events.jsonl")
     for t, uav, text in mission.events:
         if len(flight.t) and t <= flight.t[-1]:
-            events.write(t, text, uav)
+            events.write(t, text, uav, "warning")
     if refusal := tick_of(mission.scheme.name).REFUSAL:
         events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():

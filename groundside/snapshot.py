@@ -57,6 +57,8 @@ class UavState:
     """In-edges by sender."""
     disturbances: Mapping[str, float] = field(default_factory=dict)
     """True ones, by the names of the plant."""
+    mode: str = ""
+    """Of its autopilot: mission, hold, offboard; empty if it has not said so."""
     late: int = 0
     """Ticks in which the command came too late."""
 

@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ftcc.airside.scheme import Quantity
-from ftcc.groundside.dashboard.viewer import BLUEPRINT, Entry, Kind, Viewer, write
+from ftcc.groundside.dashboard.subject import Subject
+from ftcc.groundside.dashboard.viewer import Entry, Kind, Viewer, write
 from ftcc.groundside.snapshot import Event, Snapshot
-from ftcc.link.graph import Graph
 
 if TYPE_CHECKING:
     import rerun as rr
-    import rerun.blueprint as rrb
 
-    from ftcc.groundside.dashboard.plots import Plots
-    from ftcc.groundside.dashboard.scene import Scene
+    from ftcc.groundside.dashboard.artists import Artists
 
 __all__ = ["Dashboard"]
 
@@ -44,15 +40,8 @@ class Dashboard:
 
     Parameters
     ----------
-    title : str
-        Name of the recording.
-    graph : Graph
-        Who hears whom.
-    signals : sequence of Quantity
-        The scheme's ``SIGNALS``; tracking errors among them are plotted, with their bounds.
-    limits : mapping of str to (float, float)
-        Actuator limits by the names of ``ACTUATORS``, rad and N; an actuator without travel is not plotted.
-    leaders, followers : sequence of int
+    subject : Subject
+        What is shown.
     recording : Path, optional
         Where the recording (.rrd) goes.
     viewer : "web", "native" or "none"
@@ -60,8 +49,6 @@ class Dashboard:
         Of the viewer's data and of its page; free ones if None.
     open_browser : bool
         Whether ``web`` opens the user's browser, where there is a screen.
-    stale_after : float
-        Age from which what was heard last counts as stale, s.
     """
 
     address: str | None
@@ -69,30 +56,17 @@ class Dashboard:
 
     def __init__(
         self,
+        subject: Subject,
         *,
-        title: str,
-        graph: Graph,
-        signals: Sequence[Quantity],
-        limits: Mapping[str, tuple[float, float]],
-        leaders: Sequence[int],
-        followers: Sequence[int],
         recording: Path | None,
         viewer: Kind,
         ports: tuple[int, int] | None = None,
         open_browser: bool = False,
-        stale_after: float = 0.5,
     ) -> None:
         self.address = None
-        self._title = title
-        self._graph = graph
-        self._signals = signals
-        self._limits = limits
-        self._leaders = leaders
-        self._followers = followers
-        self._stale_after = stale_after
+        self._subject = subject
         self._id = uuid.uuid4()
-        self._scene: Scene | None = None
-        self._plots: Plots | None = None
+        self._artists: Artists | None = None
         self._recording: rr.RecordingStream | None = None
         self._viewer: Viewer | None = None
         self._problems: list[str] = []
@@ -111,13 +85,13 @@ class Dashboard:
         if self._recording is None and self._viewer is None:
             return
         self._t = snapshot.t
+        from ftcc.groundside.dashboard.artists import Artists
+
         entries: list[Entry] = []
-        if self._scene is None or self._plots is None:
-            entries += self._begin(snapshot)
-        assert self._scene is not None
-        assert self._plots is not None
-        entries += self._scene.draw(snapshot)
-        entries += self._plots.draw(snapshot)
+        if self._artists is None:
+            self._artists = Artists(self._subject, snapshot)
+            entries += self._artists.static()
+        entries += self._artists.draw(snapshot)
         entries += self._own_events()
         if self._viewer is not None:
             self._viewer.show(entries)
@@ -143,19 +117,9 @@ class Dashboard:
             self._viewer.close()
             self._viewer = None
 
-    def _begin(self, snapshot: Snapshot) -> list[Entry]:
-        """What is logged once; the first snapshot tells how large the swarm is."""
-        from ftcc.groundside.dashboard.plots import Plots
-        from ftcc.groundside.dashboard.scene import Scene
-
-        self._scene = Scene(self._graph, self._leaders, self._stale_after, snapshot)
-        self._plots = Plots(self._signals, self._limits, self._leaders, self._followers)
-        blueprint = Entry(BLUEPRINT, None, _blueprint(self._scene, self._plots))
-        return [blueprint, *self._scene.static(), *self._plots.static()]
-
     def _own_events(self) -> list[Entry]:
         """The dashboard's own trouble, for its event log."""
-        from ftcc.groundside.dashboard.plots import events
+        from ftcc.groundside.dashboard.table import events
 
         problem = self._viewer.take_problem() if self._viewer is not None else None
         if problem is None:
@@ -175,7 +139,7 @@ class Dashboard:
 
         stream = self._stream(_TO_VIEWER)
         stream.set_sinks(rr.GrpcSink(address))
-        stream.send_recording_name(self._title)
+        stream.send_recording_name(self._subject.title)
         return stream
 
     def _to_file(self, path: Path) -> rr.RecordingStream:
@@ -183,36 +147,8 @@ class Dashboard:
 
         stream = self._stream(_TO_FILE)
         stream.set_sinks(rr.FileSink(path))
-        stream.send_recording_name(self._title)
+        stream.send_recording_name(self._subject.title)
         return stream
-
-
-def _blueprint(scene: Scene, plots: Plots) -> rrb.Blueprint:
-    """Left the swarm, below it the graph, the table and the events; right the plots."""
-    import rerun.blueprint as rrb
-
-    curves = plots.views()
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                scene.view(),
-                rrb.Horizontal(
-                    scene.plan_view(),
-                    rrb.Vertical(plots.table_view(), plots.log_view(), row_shares=[2, 1]),
-                    column_shares=[2, 3],
-                ),
-                row_shares=[6, 5],
-            ),
-            rrb.Vertical(*curves, row_shares=[2] + [1] * (len(curves) - 1)),
-            column_shares=[3, 2],
-        ),
-        rrb.TopPanel(state=rrb.PanelState.Collapsed),
-        rrb.BlueprintPanel(state=rrb.PanelState.Hidden),
-        rrb.SelectionPanel(state=rrb.PanelState.Hidden),
-        rrb.TimePanel(state=rrb.PanelState.Collapsed, timeline="t", play_state="following"),
-        auto_layout=False,
-        auto_views=False,
-    )
 
 
 def _load_rerun() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside.dashboard import Dashboard
-from tests.groundside.synthetic_swarm import FOLLOWERS, GRAPH, LEADERS, LIMITS, SIGNALS, flight
+from tests.groundside.synthetic_swarm import SUBJECT, flight
 
 pytestmark = [
     pytest.mark.browser,
@@ -52,18 +52,7 @@ class Swarm:
 
 @pytest.fixture
 def dashboard() -> Iterator[Dashboard]:
-    made = Dashboard(
-        title="synthetic swarm",
-        graph=GRAPH,
-        signals=SIGNALS,
-        limits=LIMITS,
-        leaders=LEADERS,
-        followers=FOLLOWERS,
-        recording=None,
-        viewer="web",
-        ports=None,
-        open_browser=False,
-    )
+    made = Dashboard(SUBJECT, recording=None, viewer="web")
     yield made
     made.close()
 

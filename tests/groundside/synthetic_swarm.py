@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ftcc.airside.scheme import Quantity
+from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
 
@@ -21,10 +22,12 @@ GRAPH = Graph(
 )
 SIGNALS = (
     Quantity("zhat", "m", "estimated altitude reference"),
+    Quantity("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
     Quantity("S1", "m", "altitude tracking error", bound=1.0),
     Quantity("S5", "m/s", "speed tracking error"),
 )
-LIMITS = {"aileron": (0.0, 0.0), "elevator": (-0.7, 0.7), "rudder": (0.0, 0.0), "thrust": (0.0, 40.0)}
+LIMITS = {"elevator": (-0.7, 0.7), "thrust": (0.0, 40.0)}
+SUBJECT = Subject("synthetic swarm", "containment", GRAPH, SIGNALS, LIMITS, (("d1", "m/s^2"),))
 
 FAULT_AT = 20.0
 """Elevator of UAV 1, s."""
@@ -58,8 +61,10 @@ def snapshot(t: float, events: tuple[Event, ...] = ()) -> Snapshot:
             acting=command | ({"elevator": 0.7 * elevator + 0.35} if faulty else {}),
             effectiveness={"elevator": 0.7 if faulty else 1.0, "thrust": 1.0},
             bias={"elevator": 0.35 if faulty else 0.0, "thrust": 0.0},
-            signals={"zhat": z, "S1": S1, "S5": 0.02 * math.cos(t + i)},
+            signals={"zhat": z, "d1_hat": 0.19, "S1": S1, "S5": 0.02 * math.cos(t + i)},
             links={j: _link(t, uav, j) for j in GRAPH.senders(uav)},
+            disturbances={"d1": 0.2},
+            mode="mission",
         )
     for i, uav in enumerate(LEADERS):
         truth = _truth(30.0 * t, float(leaders[i]), 0.0, 0.0)

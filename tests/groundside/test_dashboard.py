@@ -33,7 +33,7 @@ from tests.groundside.synthetic_swarm import (
     HAPPENINGS,
     LEADERS,
     LIMITS,
-    SIGNALS,
+    SUBJECT,
     flight,
     leaders_at,
     snapshot,
@@ -48,8 +48,7 @@ from pathlib import Path
 from ftcc.groundside.dashboard import Dashboard
 from tests.groundside.synthetic_swarm import *
 recording = Path(sys.argv[1]) if sys.argv[1] != "-" else None
-dashboard = Dashboard(title="killed", graph=GRAPH, signals=SIGNALS, limits=LIMITS, leaders=LEADERS,
-    followers=FOLLOWERS, recording=recording, viewer=sys.argv[2], ports=None, open_browser=False)
+dashboard = Dashboard(SUBJECT, recording=recording, viewer=sys.argv[2])
 print(dashboard._viewer._process.pid if dashboard._viewer else "rerun" in sys.modules, flush=True)
 for s in flight(float(sys.argv[3])):
     dashboard.log(s)
@@ -62,17 +61,7 @@ dashboard.close()
 
 
 def make(recording: Path | None, viewer: Any = "none", **others: Any) -> Dashboard:
-    return Dashboard(
-        title="synthetic swarm",
-        graph=GRAPH,
-        signals=SIGNALS,
-        limits=LIMITS,
-        leaders=LEADERS,
-        followers=FOLLOWERS,
-        recording=recording,
-        viewer=viewer,
-        **({"ports": None, "open_browser": False} | others),
-    )
+    return Dashboard(SUBJECT, recording=recording, viewer=viewer, **others)
 
 
 def station(*arguments: str, **environment: str) -> subprocess.Popen[str]:
@@ -128,24 +117,25 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_simulated_time_is_a_timeline_in_seconds(recording: Path) -> None:
-    times, _ = rows(recording, "/plots/altitude/uavs", "Scalars:scalars")
+    times, _ = rows(recording, "/plots/motion/z/uavs", "Scalars:scalars")
     np.testing.assert_allclose(times, np.arange(round(10 * DURATION) + 1) / 10.0, atol=1e-6)
 
 
 def test_altitudes_of_all_uavs_and_the_leaders_hull(recording: Path) -> None:
     t = 17.3
-    altitudes = at(recording, "/plots/altitude/uavs", "Scalars:scalars", t)
+    altitudes = at(recording, "/plots/motion/z/uavs", "Scalars:scalars", t)
     expected = snapshot(t).uavs
-    np.testing.assert_allclose(altitudes, [expected[uav].truth["z"] for uav in sorted(expected)])
-    middle = at(recording, "/plots/altitude/hull", "Measurements:values", t)[0]
-    half = at(recording, "/plots/altitude/hull", "Measurements:variances", t)[0] ** 0.5
+    true = [expected[uav].truth["z"] for uav in sorted(expected)]
+    np.testing.assert_allclose(altitudes, [*true, *(expected[uav].signals["zhat"] for uav in FOLLOWERS)])
+    middle = at(recording, "/plots/motion/z/hull", "Measurements:values", t)[0]
+    half = at(recording, "/plots/motion/z/hull", "Measurements:variances", t)[0] ** 0.5
     np.testing.assert_allclose([middle - half, middle + half], sorted(leaders_at(t)))
 
 
 def test_series_are_named_and_coloured_by_uav(recording: Path) -> None:
-    _, names = rows(recording, "/plots/altitude/uavs", "SeriesLines:names")
-    assert names == [[f"UAV {uav}" for uav in (*FOLLOWERS, *LEADERS)]]
-    _, tints = rows(recording, "/plots/altitude/uavs", "SeriesLines:colors")
+    _, names = rows(recording, "/plots/motion/z/uavs", "SeriesLines:names")
+    assert names[0][: len(GRAPH.uavs)] == [f"UAV {uav}" for uav in (*FOLLOWERS, *LEADERS)]
+    _, tints = rows(recording, "/plots/motion/z/uavs", "SeriesLines:colors")
     _, shape = rows(recording, "/world/uav/3/airframe", "Mesh3D:albedo_factor")
     assert shape[0][0] == tints[0][2]
 
@@ -158,6 +148,24 @@ def test_tracking_errors_with_their_bounds(recording: Path) -> None:
     assert rows(recording, "/plots/errors/zhat", "Scalars:scalars")[1] == []
 
 
+def test_an_estimate_stands_beside_the_true_value(recording: Path) -> None:
+    values = at(recording, "/plots/estimates/d1_hat", "Scalars:scalars", 25.0)
+    np.testing.assert_allclose(values, [0.19] * len(FOLLOWERS) + [0.2] * len(FOLLOWERS))
+
+
+def test_the_true_effectiveness_falls_with_the_fault(recording: Path) -> None:
+    for t, left in ((FAULT_AT - 0.1, 1.0), (FAULT_AT, 0.7)):
+        assert at(recording, "/plots/effectiveness/elevator", "Scalars:scalars", t)[0] == left
+
+
+def test_a_reference_is_the_aircraft_where_its_law_wants_it(recording: Path) -> None:
+    uavs = snapshot(21.0).uavs
+    _, north, up = at(recording, "/world/reference/1", "Transform3D:translation", 21.0)[0]
+    assert up == pytest.approx(uavs[1].signals["zhat"], abs=1e-3)
+    assert north == pytest.approx(uavs[1].truth["x"], abs=1e-3)
+    assert rows(recording, "/world/reference/7", "Transform3D:translation")[1] == []
+
+
 def test_elevator_and_thrust_acting_and_commanded_between_their_limits(recording: Path) -> None:
     uavs = snapshot(25.0).uavs
     for actuator in ("elevator", "thrust"):
@@ -165,7 +173,6 @@ def test_elevator_and_thrust_acting_and_commanded_between_their_limits(recording
         acting = [uavs[i].acting[actuator] for i in FOLLOWERS]
         commanded = [uavs[i].command[actuator] for i in FOLLOWERS]
         np.testing.assert_allclose(values, [*acting, *commanded, *LIMITS[actuator]])
-    assert rows(recording, "/plots/actuators/aileron", "Scalars:scalars")[1] == []
 
 
 def test_aircraft_stand_at_their_true_places_in_lanes_and_in_their_attitude(recording: Path) -> None:
@@ -216,6 +223,7 @@ def test_a_fault_is_written_at_its_aircraft_and_in_the_table(recording: Path) ->
     label = at(recording, "/world/uav/1/label", "Points3D:labels", FAULT_AT)
     assert label == ["UAV 1: elevator 70 % +0.35"]
     table = at(recording, "/swarm", "TextDocument:text", DURATION)[0]
+    assert "| 2 | mission |" in table
     assert "elevator 70 %" in next(line for line in table.splitlines() if line.startswith("| 1 |"))
 
 
@@ -232,7 +240,11 @@ def test_the_recording_carries_its_blueprint(recording: Path) -> None:
     (blueprint,) = reader.blueprints()
     said = [chunk.to_record_batch() for chunk in reader.stream(store=blueprint).to_chunks()]
     texts = {str(value) for batch in said for name in batch.schema.names if ":" in name for value in batch[name]}
-    for title in ("Altitude (band: between the leaders), m", "Altitude tracking error S1, m", "Events"):
+    for title in (
+        "Altitude, m (band: between the leaders, thin: reference)",
+        "Altitude tracking error S1, m",
+        "Events",
+    ):
         assert any(title in text for text in texts)
 
 
@@ -248,7 +260,7 @@ def test_a_uav_that_falls_silent_is_said_to_be(tmp_path: Path) -> None:
     dashboard.close()
     assert at(tmp_path / "swarm.rrd", "/world/uav/5/label", "Points3D:labels", 4.0) == ["UAV 5: silent since 1 s"]
     assert at(tmp_path / "swarm.rrd", "/world/uav/6/label", "Points3D:labels", 4.0) == ["UAV 6: not heard"]
-    assert np.isnan(at(tmp_path / "swarm.rrd", "/plots/altitude/uavs", "Scalars:scalars", 4.0)[5])
+    assert np.isnan(at(tmp_path / "swarm.rrd", "/plots/motion/z/uavs", "Scalars:scalars", 4.0)[5])
 
 
 def test_a_formation_that_spreads_is_not_put_into_lanes(tmp_path: Path) -> None:
@@ -284,7 +296,7 @@ def test_a_killed_recording_is_readable_to_its_last_seconds(tmp_path: Path) -> N
             break
     process.kill()
     process.wait()
-    times, _ = rows(path, "/plots/altitude/uavs", "Scalars:scalars")
+    times, _ = rows(path, "/plots/motion/z/uavs", "Scalars:scalars")
     # 0.05 s of wall time pass in 0.1 s of simulated time; pieces of 2 s are written.
     assert times[-1] >= killed_at - 6.0
     assert len(rr.chunk.RrdReader(path).blueprints()) == 1
@@ -340,7 +352,7 @@ def test_a_viewer_that_dies_or_hangs_costs_the_swarm_nothing(watched: tuple[Dash
     assert time.perf_counter() - begun < 5.0
     assert longest < 0.5
     assert not Path(f"/proc/{viewer}").exists()
-    times, _ = rows(path, "/plots/altitude/uavs", "Scalars:scalars")
+    times, _ = rows(path, "/plots/motion/z/uavs", "Scalars:scalars")
     assert len(times) == 201
     if harm == signal.SIGKILL:
         assert [problem.text for problem in problems] == [
@@ -383,7 +395,7 @@ def test_a_viewer_whose_port_is_taken_is_reported_and_the_flight_recorded(tmp_pa
         assert [event.text for event in dashboard.take_problems()] == [f"no viewer: port {ports[0]} is in use"]
         assert dashboard.address is None
         dashboard.close()
-    assert len(rows(tmp_path / "swarm.rrd", "/plots/altitude/uavs", "Scalars:scalars")[0]) == 2
+    assert len(rows(tmp_path / "swarm.rrd", "/plots/motion/z/uavs", "Scalars:scalars")[0]) == 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the viewer follows its station into death on Linux only")

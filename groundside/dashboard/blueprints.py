@@ -1,0 +1,52 @@
+"""How the views stand on the screen: left the swarm, below it the graph, the table and the events; right the curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import rerun.blueprint as rrb
+
+from ftcc.groundside.dashboard.table import log_view
+
+if TYPE_CHECKING:
+    from ftcc.groundside.dashboard.plots import Plots
+    from ftcc.groundside.dashboard.scene import Scene
+    from ftcc.groundside.dashboard.table import Table
+
+__all__ = ["blueprint"]
+
+_BESIDE = 4
+"""Plots below one another; more stand in two columns."""
+
+
+def blueprint(scene: Scene, plots: Plots, table: Table) -> rrb.Blueprint:
+    """The layout that goes into the viewer and into the recording."""
+    groups = plots.views()
+    first = groups.pop("Tracking")
+    tabs = [_stack(views, name) for name, views in groups.items()]
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(
+                scene.view(),
+                rrb.Horizontal(
+                    scene.links.view(),
+                    rrb.Vertical(table.view(), log_view(), row_shares=[3, 2]),
+                    column_shares=[2, 3],
+                ),
+                row_shares=[6, 5],
+            ),
+            rrb.Vertical(_stack(first, "Tracking"), rrb.Tabs(*tabs), row_shares=[3, 2]),
+            column_shares=[3, 2],
+        ),
+        rrb.TopPanel(state=rrb.PanelState.Collapsed),
+        rrb.BlueprintPanel(state=rrb.PanelState.Hidden),
+        rrb.SelectionPanel(state=rrb.PanelState.Hidden),
+        rrb.TimePanel(state=rrb.PanelState.Collapsed, timeline="t", play_state="following"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _stack(views: list[rrb.View], name: str) -> rrb.Container:
+    """Plots below one another, or in two columns."""
+    return rrb.Vertical(*views, name=name) if len(views) <= _BESIDE else rrb.Grid(*views, grid_columns=2, name=name)

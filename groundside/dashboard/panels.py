@@ -1,0 +1,187 @@
+"""Which curves a swarm is shown by: from what its scheme declares, so that a scheme of one's own is shown, too.
+
+An error is a signal with a bound, or one whose meaning says "error". An estimate is one whose meaning begins with
+"estimated disturbance", "estimated effect", "estimated lumped" or "unexplained"; where it is called NAME_hat and the
+vehicle tells the station the disturbance NAME, the true value is drawn with it. What a law adapts has a meaning that
+says "network", "adapted" or "weights".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from ftcc.airside.scheme import Quantity
+from ftcc.groundside.dashboard.subject import Subject
+from ftcc.groundside.snapshot import UavState
+from ftcc.link.actuators import unit_of
+
+__all__ = ["Panel", "panels_of"]
+
+Source = Literal["truth", "signals", "command", "acting", "effectiveness", "disturbances"]
+Where = tuple[Source, str]
+
+_MOTION = {
+    "containment": ("z", "V"),
+    "formation": ("z", "V"),
+    "attitude": ("mu", "alpha", "beta"),
+    "fire": ("V", "z"),
+}
+"""True states that tell how the flight goes, by family."""
+_MEANINGS = {
+    "z": ("Altitude", "m"),
+    "V": ("Airspeed", "m/s"),
+    "mu": ("Bank", "rad"),
+    "alpha": ("Angle of attack", "rad"),
+    "beta": ("Sideslip", "rad"),
+}
+_MOST = 6
+"""Panels in a group."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One plot: a curve per UAV, and what belongs to it."""
+
+    path: str
+    title: str
+    unit: str
+    value: Where
+    second: Where | None = None
+    """Drawn thin beside it."""
+    everybody: bool = False
+    """Leaders, too."""
+    bound: float | str | None = None
+    """A constant, or the signal that bounds the value both ways."""
+    limits: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+    """How to read it."""
+    band: bool = False
+    """Shade what lies between the leaders."""
+    degrees: bool = False
+    """Show angles in degrees, as the chapters on attitude do."""
+
+    @property
+    def scale(self) -> float:
+        """From the recorded unit to the one that is shown."""
+        return math.degrees(1.0) if self.degrees and self.unit.startswith("rad") else 1.0
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit on the axis."""
+        return self.unit.replace("rad", "deg", 1) if self.degrees else self.unit
+
+    def read(self, where: Where, state: UavState | None) -> float:
+        """A number of a UAV in the shown unit; nan if it is not known."""
+        if state is None:
+            return math.nan
+        source, name = where
+        return getattr(state, source).get(name, math.nan) * self.scale  # type: ignore[no-any-return]
+
+
+def panels_of(subject: Subject) -> dict[str, list[Panel]]:
+    """The panels by group: "Tracking", "Commands", "Estimates", "Adaptation"; empty groups are left out."""
+    groups = {
+        "Tracking": [*_motion(subject), *_errors(subject)],
+        "Commands": _commands(subject),
+        "Estimates": [*_estimates(subject), *_effectiveness(subject)],
+        "Adaptation": _adaptation(subject),
+    }
+    degrees = subject.family == "attitude"
+    return {name: [replace(panel, degrees=degrees) for panel in panels] for name, panels in groups.items() if panels}
+
+
+def _motion(subject: Subject) -> list[Panel]:
+    names = {signal.name for signal in subject.signals}
+    panels = []
+    for name in _MOTION[subject.family]:
+        meaning, unit = _MEANINGS[name]
+        references = [r for r in (f"{name}_r", f"{name}_d", f"{name}hat", f"{name}_hat", f"{name}_id") if r in names]
+        band = name == "z" and subject.family == "containment"
+        panels.append(
+            Panel(
+                path=f"/plots/motion/{name}",
+                title=meaning,
+                unit=unit,
+                value=("truth", name),
+                second=("signals", references[0]) if references else None,
+                everybody=True,
+                band=band,
+                notes=(*(["band: between the leaders"] if band else []), *(["thin: reference"] if references else [])),
+            )
+        )
+    return panels
+
+
+def _errors(subject: Subject) -> list[Panel]:
+    found = [s for s in subject.signals if s.bound is not None]
+    found += [s for s in subject.signals if s.bound is None and "error" in s.meaning and s.unit != "-"]
+    return [
+        Panel(f"/plots/errors/{s.name}", _title(s), s.unit, ("signals", s.name), bound=s.bound) for s in found[:_MOST]
+    ]
+
+
+def _commands(subject: Subject) -> list[Panel]:
+    return [
+        Panel(
+            path=f"/plots/actuators/{name}",
+            title=name.capitalize().replace("_", " "),
+            unit=unit_of(name),
+            value=("acting", name),
+            second=("command", name),
+            limits=limit,
+            notes=("thin: commanded", "gray: limits"),
+        )
+        for name, limit in subject.limits.items()
+    ]
+
+
+def _estimates(subject: Subject) -> list[Panel]:
+    told = dict(subject.disturbances)
+    panels = []
+    for signal in subject.signals:
+        if not re.match(r"(estimated (disturbance|effect|lumped)|unexplained)", signal.meaning):
+            continue
+        stem = signal.name.removesuffix("_hat")
+        true: Where | None = ("disturbances", stem) if stem in told and stem != signal.name else None
+        panels.append(
+            Panel(
+                path=f"/plots/estimates/{signal.name}",
+                title=_title(signal),
+                unit=signal.unit,
+                value=("signals", signal.name),
+                second=true,
+                notes=("thin: true",) if true else (),
+            )
+        )
+    return panels[:_MOST]
+
+
+def _effectiveness(subject: Subject) -> list[Panel]:
+    return [
+        Panel(
+            path=f"/plots/effectiveness/{name}",
+            title=f"True effectiveness of the {name.replace('_', ' ')}",
+            unit="-",
+            value=("effectiveness", name),
+        )
+        for name, limit in subject.limits.items()
+    ]
+
+
+def _adaptation(subject: Subject) -> list[Panel]:
+    adapted = [s for s in subject.signals if re.search(r"network|adapted|weights", s.meaning)]
+    return [Panel(f"/plots/adaptation/{s.name}", _title(s), s.unit, ("signals", s.name)) for s in adapted[:8]]
+
+
+def _title(signal: Quantity) -> str:
+    meaning = signal.meaning or signal.name
+    return f"{meaning[0].upper()}{meaning[1:]} {signal.name}" if signal.meaning else signal.name
+
+
+def uavs_of(panel: Panel, subject: Subject) -> Sequence[int]:
+    """Whose curves a panel shows."""
+    return sorted(subject.graph.uavs) if panel.everybody else subject.followers

@@ -1,0 +1,68 @@
+"""Shapes and directions of the three-dimensional view: an airframe, arrows, rotations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NORTH_TO_WORLD", "SPAN", "airframe", "arrows", "outline", "times"]
+
+# Airframe, m: x forward, y right, z down; corners of flat parts, each a fan of triangles.
+SPAN = 3.24
+_PARTS = (
+    ((0.15, 0.0, 0.0), (0.02, 1.62, -0.1), (-0.3, 1.62, -0.1), (-0.4, 0.0, 0.0)),
+    ((0.15, 0.0, 0.0), (-0.4, 0.0, 0.0), (-0.3, -1.62, -0.1), (0.02, -1.62, -0.1)),
+    ((-0.95, 0.0, -0.05), (-1.05, 0.55, -0.05), (-1.25, 0.55, -0.05), (-1.3, 0.0, -0.05)),
+    ((-0.95, 0.0, -0.05), (-1.3, 0.0, -0.05), (-1.25, -0.55, -0.05), (-1.05, -0.55, -0.05)),
+    ((-0.8, 0.0, -0.05), (-1.15, 0.0, -0.55), (-1.35, 0.0, -0.55), (-1.3, 0.0, -0.05)),
+)
+_BODY = ((1.0, 0.0, 0.0), 0.3, 0.14, (-1.3, 0.0, -0.05))
+"""Nose, station and half-width of the thickest section, tail."""
+
+NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
+"""Rotation from north-east-down to east-north-up as a quaternion, scalar first."""
+
+
+def times(a: Sequence[float], b: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Product of two quaternions, scalar first."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def arrows(
+    start: NDArray[np.float64], end: NDArray[np.float64], gap: float, aside: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origins and vectors of arrows that leave room at both ends and keep to the right of the straight line."""
+    along = end - start
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    ahead = along / length
+    right = np.zeros_like(ahead)
+    right[:, 0], right[:, 1] = ahead[:, 1], -ahead[:, 0]
+    gap_here = np.minimum(gap, 0.3 * length)
+    origins = start + gap_here * ahead + aside * right
+    return origins, along - 2.0 * gap_here * ahead
+
+
+def airframe(scale: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Vertices and normals, shape (n, 3), three vertices to a triangle."""
+    triangles = [(part[0], part[i], part[i + 1]) for part in _PARTS for i in range(1, len(part) - 1)]
+    nose, station, half, tail = _BODY
+    ring = [(station, half * math.cos(a), half * math.sin(a)) for a in np.arange(6) * math.pi / 3.0]
+    for i in range(6):
+        triangles += [(nose, ring[i], ring[(i + 1) % 6]), (tail, ring[(i + 1) % 6], ring[i])]
+    corners = np.array(triangles, dtype=np.float32)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return scale * corners.reshape(-1, 3), np.repeat(normals, 3, axis=0).astype(np.float32)
+
+
+def outline(scale: float) -> list[NDArray[np.float32]]:
+    """The airframe's edges as closed strips: what a reference looks like."""
+    return [scale * np.array([*part, part[0]], dtype=np.float32) for part in _PARTS]

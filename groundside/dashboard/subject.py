@@ -1,0 +1,74 @@
+"""What a dashboard shows: the swarm, apart from what happens to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from ftcc.airside.scheme import Quantity
+from ftcc.link.actuators import SLOT
+from ftcc.link.graph import Graph
+from ftcc.sim.obstacles import Obstacle
+from ftcc.sim.plants import find
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["Family", "Subject"]
+
+Family = Literal["containment", "formation", "attitude", "fire"]
+"""What kind of flight the blueprint is for."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A swarm to show."""
+
+    title: str
+    """Name of the recording."""
+    family: Family
+    graph: Graph
+    """Who hears whom."""
+    signals: tuple[Quantity, ...]
+    """The scheme's ``SIGNALS``."""
+    limits: Mapping[str, tuple[float, float]]
+    """Limits of the actuators that the scheme commands, by name, in their units."""
+    disturbances: tuple[tuple[str, str], ...] = ()
+    """Names and units of the plant's disturbances."""
+    obstacles: tuple[Obstacle, ...] = ()
+    stale_after: float = 0.5
+    """Age from which what was heard last counts as stale, s."""
+
+    @classmethod
+    def of(cls, mission: Mission) -> Subject:
+        """What is to be shown of a mission's flight."""
+        plant = find(mission.plant)
+        follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
+        return cls(
+            title=mission.title,
+            family=_family(mission.scheme.plant, mission.graph),
+            graph=mission.graph,
+            signals=mission.scheme.signals,
+            limits={name: follower.limits[SLOT[name]] for name in mission.scheme.commands},
+            disturbances=plant.DISTURBANCES,
+            obstacles=mission.obstacles,
+        )
+
+    @property
+    def followers(self) -> tuple[int, ...]:
+        """Ids, ascending."""
+        return tuple(sorted(self.graph.followers))
+
+    @property
+    def leaders(self) -> tuple[int, ...]:
+        """Ids, ascending."""
+        return tuple(sorted(self.graph.leaders))
+
+
+def _family(plant: str, graph: Graph) -> Family:
+    if plant == "attitude":
+        return "attitude"
+    if plant == "position":
+        return "fire"
+    return "containment" if len(graph.leaders) > 1 else "formation"

@@ -1,0 +1,73 @@
+"""What surrounds the swarm: the leaders' hull and obstacles."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from ftcc.groundside.dashboard.subject import Subject
+from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.palette import GRAY
+
+__all__ = ["Surroundings"]
+
+_MARGIN = 6.0
+"""How far frames and obstacles reach beyond the swarm sideways, m."""
+_APART = 1.0
+"""Leaders that begin farther apart than this along the flight span a box, not two levels, m."""
+_OBSTACLE = (*GRAY, 70)
+_DEEP = 200.0
+"""Height of an obstacle that is drawn, from its top downwards, m."""
+
+
+class Surroundings:
+    """Draws the hull about the swarm, and the obstacles beneath it."""
+
+    def __init__(self, subject: Subject, positions: NDArray[np.float64]) -> None:
+        self._subject = subject
+        seen = positions[np.isfinite(positions[:, 0])] if np.isfinite(positions).any() else np.zeros((1, 3))
+        self._west, self._east = float(seen[:, 0].min()) - _MARGIN, float(seen[:, 0].max()) + _MARGIN
+        self._leaders = [sorted(subject.graph.uavs).index(uav) for uav in subject.leaders]
+        self._boxed = len(self._leaders) > 1 and float(np.ptp(positions[self._leaders, 1])) > _APART
+
+    @property
+    def notes(self) -> list[str]:
+        """What the name of the view says of it."""
+        hull = "box: between the leaders" if self._boxed else "frames: lowest and highest leader"
+        notes = [hull] if len(self._leaders) > 1 else []
+        return notes + (["blocks: obstacles"] if self._subject.obstacles else [])
+
+    def static(self) -> list[Entry]:
+        """Obstacles, and how the hull looks."""
+        entries = [
+            Entry("/world/hull", None, rr.LineStrips3D.from_fields(colors=GRAY, radii=rr.Radius.ui_points(1.0))),
+        ]
+        obstacles = self._subject.obstacles
+        if obstacles:
+            half = [((self._east - self._west) / 2, (o.end - o.start) / 2, _DEEP / 2) for o in obstacles]
+            centre = (self._west + self._east) / 2
+            boxes = rr.Boxes3D(
+                centers=[(centre, (o.start + o.end) / 2, o.top - _DEEP / 2) for o in obstacles],
+                half_sizes=half,
+                colors=[_OBSTACLE] * len(obstacles),
+                fill_mode="TransparentFillMajorWireframe",
+            )
+            entries.append(Entry("/world/obstacles", None, boxes))
+        return entries
+
+    def draw(self, t: float, positions: NDArray[np.float64]) -> list[Entry]:
+        """The hull of the leaders at ``positions`` (n, 3) of all: two levels, or a box where they fly apart."""
+        leaders = positions[self._leaders]
+        if len(leaders) < 2 or not np.isfinite(leaders).all():
+            return []
+        seen = positions[np.isfinite(positions[:, 0])]
+        low, high = seen.min(axis=0) - _MARGIN, seen.max(axis=0) + _MARGIN
+        if self._boxed:
+            low[1], high[1] = leaders[:, 1].min(), leaders[:, 1].max()
+        bottom, top = leaders[:, 2].min(), leaders[:, 2].max()
+        ring = np.array([(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]), (low[0], low[1])])
+        strips = [np.column_stack([ring, np.full(5, level)]) for level in (bottom, top)]
+        if self._boxed:
+            strips += [np.array([(*corner, bottom), (*corner, top)]) for corner in ring[:4]]
+        return [Entry("/world/hull", t, rr.LineStrips3D.from_fields(strips=strips))]

@@ -1,0 +1,87 @@
+"""The swarm in words: a table of all UAVs and the log of events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TimelineColumn
+
+from ftcc.groundside.dashboard.subject import Subject
+from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.dashboard.words import faults, name, silent_since
+from ftcc.groundside.snapshot import Event, Snapshot, UavState
+
+__all__ = ["Table", "events", "log_view"]
+
+_EVERY = 10
+"""Snapshots from one table to the next."""
+_LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
+
+
+class Table:
+    """Writes the table once in a while; it is text, and dearer than a curve."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+        self._in = 0
+
+    def view(self) -> rrb.TextDocumentView:
+        """The swarm as a table."""
+        return rrb.TextDocumentView(origin="/swarm", name="Swarm", titlebar=False)
+
+    def draw(self, snapshot: Snapshot) -> list[Entry]:
+        """The table, if it is due."""
+        due = self._in == 0
+        self._in = (self._in + 1) % _EVERY
+        if not due:
+            return []
+        return [Entry("/swarm", snapshot.t, rr.TextDocument(self._text(snapshot), media_type="text/markdown"))]
+
+    def _text(self, snapshot: Snapshot) -> str:
+        heads = ("UAV", "mode", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks")
+        rows = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+        rows += [self._row(uav, snapshot) for uav in sorted(self._subject.graph.uavs)]
+        return "\n".join(rows)
+
+    def _row(self, uav: int, snapshot: Snapshot) -> str:
+        leads = uav in self._subject.leaders
+        label = f"{uav} leader" if leads else f"{uav}"
+        state = snapshot.uavs.get(uav)
+        if state is None:
+            return f"| {label} | | | | not heard | | |"
+        silent = silent_since(state, snapshot)
+        health = silent or faults(state) or ("" if leads else "healthy")
+        z, speed = state.truth["z"], state.truth["V"]
+        return f"| {label} | {state.mode} | {z:.1f} | {speed:.2f} | {health} | {_heard(state)} | {state.late} |"
+
+
+def _heard(state: UavState) -> str:
+    links = state.links.values()
+    if not links:
+        return ""
+    received, lost = sum(link.received for link in links), sum(link.lost for link in links)
+    share = f", {100.0 * lost / (received + lost):.0f} % lost" if lost else ""
+    return f"{sum(not link.cut for link in links)} of {len(links)}{share}"
+
+
+def log_view() -> rrb.TextLogView:
+    """Events, by simulated time."""
+    # The time stands in the text: Rerun's column for it is too narrow to read.
+    clock = TimelineColumn("t", visible=False)
+    columns = rrb.TextLogColumns(timeline_columns=[clock], text_log_columns=["loglevel", "body"])
+    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+
+
+def events(happened: Iterable[Event]) -> list[Entry]:
+    """Lines of the event log."""
+    entries = []
+    for event in happened:
+        whose = f"{name(event.uav)}: " if event.uav is not None and not event.text.startswith("UAV ") else ""
+        asked = f" ({event.who} asked)" if event.who else ""
+        outcome = f": {event.outcome}" if event.outcome else ""
+        text = f"{event.t:.1f} s  {whose}{event.text}{outcome}{asked}"
+        level = _LEVELS.get(event.severity, event.severity.upper())
+        entries.append(Entry("/events", event.t, rr.TextLog(text, level=level)))
+    return entries

@@ -1,0 +1,34 @@
+"""How a UAV and its state are put into words, the same in all views."""
+
+from __future__ import annotations
+
+from ftcc.groundside.snapshot import Snapshot, UavState
+
+__all__ = ["faults", "faulty", "name", "silent_since"]
+
+_SILENT = 1.0
+"""Age of a UAV's telemetry from which it counts as silent, s."""
+
+
+def name(uav: int) -> str:
+    """What a UAV is called everywhere."""
+    return f"UAV {uav}"
+
+
+def faults(uav: UavState) -> str:
+    """The actuators that do not act as commanded, in words; empty if all do. The bias is told of a single one."""
+    words = [f"{actuator} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in faulty(uav)]
+    if len(words) == 1:
+        bias = uav.bias.get(faulty(uav)[0], 0.0)
+        return words[0] + (f" {bias:+.2g}" if bias else "")
+    return ", ".join(words)
+
+
+def faulty(uav: UavState) -> list[str]:
+    """Names of the actuators that do not act as commanded."""
+    return [name for name, left in uav.effectiveness.items() if left != 1.0 or uav.bias.get(name, 0.0) != 0.0]
+
+
+def silent_since(uav: UavState, snapshot: Snapshot) -> str:
+    """That a UAV has fallen silent; empty if it has not."""
+    return f"silent since {uav.t:.0f} s" if snapshot.t - uav.t > _SILENT else ""
