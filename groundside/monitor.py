@@ -12,10 +12,10 @@ from types import ModuleType
 from typing import Any
 
 from ftcc.airside.ground import LINK_FIELDS
-from ftcc.airside.ground.modes import NAMES as MODES
-from ftcc.airside.ground.modes import mode_of
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.link.mavlink import STATION, Endpoint
+from ftcc.link.modes import NAMES as MODES
+from ftcc.link.modes import mode_of
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
 from ftcc.sim.process import truth_array

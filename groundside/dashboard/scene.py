@@ -152,7 +152,7 @@ class Scene:
                 self._labels[uav] = label
                 text = rr.Points3D.from_fields(labels=label, show_labels=True)
                 entries.append(Entry(f"/world/uav/{uav}/label", t, text))
-        entries += self._surroundings.draw(t, after)
+        entries += self._surroundings.draw(snapshot, after)
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 
     def _place(self, snapshot: Snapshot) -> None:

@@ -1,14 +1,18 @@
-"""What surrounds the swarm: the leaders' hull and obstacles."""
+"""What surrounds the swarm: the leaders' hull, obstacles, the front of a fire."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from ftcc.airside.references.position import Command, border
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import GRAY
+from ftcc.groundside.snapshot import Snapshot
 
 __all__ = ["Surroundings"]
 
@@ -17,6 +21,10 @@ _MARGIN = 6.0
 _APART = 1.0
 """Leaders that begin farther apart than this along the flight span a box, not two levels, m."""
 _OBSTACLE = (*GRAY, 70)
+_FIRE = (222, 84, 40)
+_BURNT = (*_FIRE, 60)
+_FRONT_EVERY = 1.0
+"""Time from one front to the next, s: it grows by a metre a second."""
 _DEEP = 200.0
 """Height of an obstacle that is drawn, from its top downwards, m."""
 
@@ -29,6 +37,7 @@ class Surroundings:
         seen = positions[np.isfinite(positions[:, 0])] if np.isfinite(positions).any() else np.zeros((1, 3))
         self._west, self._east = float(seen[:, 0].min()) - _MARGIN, float(seen[:, 0].max()) + _MARGIN
         self._leaders = [sorted(subject.graph.uavs).index(uav) for uav in subject.leaders]
+        self._front_at = -math.inf
         self._boxed = len(self._leaders) > 1 and float(np.ptp(positions[self._leaders, 1])) > _APART
 
     @property
@@ -36,7 +45,8 @@ class Surroundings:
         """What the name of the view says of it."""
         hull = "box: between the leaders" if self._boxed else "frames: lowest and highest leader"
         notes = [hull] if len(self._leaders) > 1 else []
-        return notes + (["blocks: obstacles"] if self._subject.obstacles else [])
+        notes += ["blocks: obstacles"] if self._subject.obstacles else []
+        return notes + (["red: fire"] if self._subject.fire else [])
 
     def static(self) -> list[Entry]:
         """Obstacles, and how the hull looks."""
@@ -56,8 +66,35 @@ class Surroundings:
             entries.append(Entry("/world/obstacles", None, boxes))
         return entries
 
-    def draw(self, t: float, positions: NDArray[np.float64]) -> list[Entry]:
-        """The hull of the leaders at ``positions`` (n, 3) of all: two levels, or a box where they fly apart."""
+    def draw(self, snapshot: Snapshot, positions: NDArray[np.float64]) -> list[Entry]:
+        """What changes; ``positions`` (n, 3) of all UAVs."""
+        return self._hull(snapshot.t, positions) + self._front(snapshot)
+
+    def _front(self, snapshot: Snapshot) -> list[Entry]:
+        """The border of the fire on the ground, about the centre that the UAVs refer to."""
+        if self._subject.fire is None or snapshot.t < self._front_at:
+            return []
+        told = (state.signals for state in snapshot.uavs.values() if "fire_north" in state.signals)
+        signals = next(told, None)
+        if signals is None:
+            return []
+        self._front_at = snapshot.t + _FRONT_EVERY
+        t = snapshot.t
+        here = Command(t, signals["fire_north"], signals["fire_east"], 0.0, 0.0)
+        north, east = border(self._subject.fire, [here], t).T
+        line = np.column_stack([east, north, np.zeros_like(north)])
+        burning = np.vstack([(here.east, here.north, 0.0), line])
+        fan = [(0, i, i + 1) for i in range(1, len(line))]
+        area = rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
+        return [
+            Entry("/world/fire/front", t, rr.LineStrips3D([line], colors=_FIRE, radii=rr.Radius.ui_points(2.0))),
+            Entry(
+                "/world/fire/area", t, rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
+            ),
+        ]
+
+    def _hull(self, t: float, positions: NDArray[np.float64]) -> list[Entry]:
+        """Between the leaders: two levels, or a box where they begin apart."""
         leaders = positions[self._leaders]
         if len(leaders) < 2 or not np.isfinite(leaders).all():
             return []
