@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside import cli_airframe, cli_fly, cli_ground, cli_study
+from ftcc.groundside import cli_airframe, cli_fly, cli_ground, cli_study, cli_view
 from ftcc.groundside.cli_common import (
     Duration,
     Form,
@@ -236,6 +236,7 @@ def compare(
 
 cli_airframe.register(app)
 cli_fly.register(app)
+cli_view.register(app)
 cli_ground.register(app)
 cli_study.register(app)
 

@@ -13,6 +13,7 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from ftcc.groundside.feed import Feed
 from ftcc.groundside.launcher import Outcome, Swarm
 from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.registry import Card, Control, Entry
@@ -62,6 +63,7 @@ class _Flight:
     swarm: Swarm
     station: Monitor
     dashboard: Any
+    feed: Feed | None
     log: EventLog
     say: Callable[[Event], None]
     next_event: int = 0
@@ -90,8 +92,13 @@ class _Flight:
         self.scheduled_events()
         progress(self.station.t)
         # The first picture sets the scale: it waits for everybody, but not for ever.
-        if self.dashboard is not None and (self.station.complete or self.station.t > 1.0):
-            self.dashboard.log(self.station.snapshot())
+        if not (self.station.complete or self.station.t > 1.0):
+            return
+        snapshot = self.station.snapshot()
+        if self.feed is not None:
+            self.feed.offer(snapshot)
+        if self.dashboard is not None:
+            self.dashboard.log(snapshot)
             for problem in self.dashboard.take_problems():
                 self.note(problem)
 
@@ -141,13 +148,14 @@ def fly(
     sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
     station = Monitor(ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog")
     log = EventLog(folder / "events.jsonl")
-    flight = _Flight(mission, swarm, station, None, log, say)
+    flight = _Flight(mission, swarm, station, None, None, log, say)
     control = None
     with _stopping_on_signals(swarm):
         try:
             flight.dashboard = _dashboard(mission, options, ports)
             address = flight.dashboard.address if flight.dashboard else None
             control = Control(_entry(mission, options, ports, address), lambda what, how: _obey(flight, what, how))
+            flight.feed = Feed(folder.name)
             _loop(flight, lambda: swarm.ready, control, _FIRST_START, lambda t: None)
             started(address)
             swarm.go()
@@ -162,6 +170,8 @@ def fly(
             station.close()
             if control:
                 control.close()
+            if flight.feed:
+                flight.feed.close()
             if flight.dashboard:
                 flight.dashboard.close()
             ports.release()

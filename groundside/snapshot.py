@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 __all__ = ["Event", "LinkState", "Snapshot", "UavState"]
 
@@ -72,3 +72,7 @@ class Snapshot:
     uavs: Mapping[int, UavState]
     events: tuple[Event, ...] = field(default=())
     """What happened since the last snapshot."""
+
+    def after(self, earlier: tuple[Event, ...]) -> Snapshot:
+        """The same with what happened before."""
+        return replace(self, events=earlier + self.events)

@@ -103,6 +103,11 @@ class Dashboard:
         problems, self._problems = self._problems, []
         return tuple(Event(self._t, "warning", problem) for problem in problems)
 
+    def wait(self) -> None:
+        """Wait until the viewer ends; returns at once without one."""
+        if self._viewer is not None:
+            self._viewer.wait()
+
     def close(self) -> None:
         """Finish the recording and end the viewer."""
         if self._recording is not None:

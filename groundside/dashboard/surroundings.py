@@ -22,7 +22,7 @@ _APART = 1.0
 """Leaders that begin farther apart than this along the flight span a box, not two levels, m."""
 _OBSTACLE = (*GRAY, 70)
 _FIRE = (222, 84, 40)
-_BURNT = (*_FIRE, 60)
+_BURNT = (*_FIRE, 36)
 _FRONT_EVERY = 1.0
 """Time from one front to the next, s: it grows by a metre a second."""
 _DEEP = 200.0
@@ -88,9 +88,7 @@ class Surroundings:
         area = rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
         return [
             Entry("/world/fire/front", t, rr.LineStrips3D([line], colors=_FIRE, radii=rr.Radius.ui_points(2.0))),
-            Entry(
-                "/world/fire/area", t, rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
-            ),
+            Entry("/world/fire/area", t, area),
         ]
 
     def _hull(self, t: float, positions: NDArray[np.float64]) -> list[Entry]:

@@ -102,8 +102,10 @@ class Viewer:
         Of the data and of the page; free ones if None.
     open_browser : bool
         Show the page in the user's browser, if there is a screen.
-    connect : callable
+    connect : callable, optional
         Gives the stream to the viewer at an address; may block.
+    recording : Path, optional
+        A file (.rrd) to show instead of what is logged.
     """
 
     address: str | None
@@ -114,7 +116,8 @@ class Viewer:
         kind: Literal["web", "native"],
         ports: tuple[int, int] | None,
         open_browser: bool,
-        connect: Callable[[str], rr.RecordingStream],
+        connect: Callable[[str], rr.RecordingStream] | None,
+        recording: Path | None = None,
     ) -> None:
         data_port, page_port = ports or (_free_port(), _free_port())
         self._data_port = data_port
@@ -128,7 +131,8 @@ class Viewer:
             options += ["--serve-web", "--web-viewer-port", str(inner_port), "--server-memory-limit", "256MB"]
         else:
             options += ["--memory-limit", "1GB", "--server-memory-limit", "64MB", "--hide-welcome-screen"]
-            options += ["--expect-data-soon"]
+            options += ["--expect-data-soon"] if recording is None else []
+        options += [str(recording)] if recording is not None else []
         self._open_browser = open_browser
         self._connect = connect
         self._problem: str | None = None
@@ -156,6 +160,11 @@ class Viewer:
             self._frames.put_nowait(entries)
         except queue.Full:
             self._report(_BEHIND)
+
+    def wait(self) -> None:
+        """Wait until the viewer ends."""
+        if self._process is not None:
+            self._process.wait()
 
     def take_problem(self) -> str | None:
         """What went wrong since the last call; each kind of problem once."""
@@ -216,6 +225,8 @@ class Viewer:
             return
         if self.address and self._open_browser and _has_screen():
             webbrowser.open(self.address)
+        if self._connect is None:
+            return
         stream = self._connect(self._url)
         sent = 0
         flushed = 0.0

@@ -17,7 +17,7 @@ def name(uav: int) -> str:
 
 def faults(uav: UavState) -> str:
     """The actuators that do not act as commanded, in words; empty if all do. The bias is told of a single one."""
-    words = [f"{actuator} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in faulty(uav)]
+    words = [f"{actuator.replace('_', ' ')} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in faulty(uav)]
     if len(words) == 1:
         bias = uav.bias.get(faulty(uav)[0], 0.0)
         return words[0] + (f" {bias:+.2g}" if bias else "")

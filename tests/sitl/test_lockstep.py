@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import multiprocessing
+import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from ftcc.groundside.feed import feed_path, watched
 from tests.sitl.conftest import Flight, same_flight
 
 DURATION = "30"
@@ -58,6 +61,27 @@ def test_with_loss_on_a_loaded_machine_too(
     flight = fly("containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1")
     assert flight.wait(240) == 0, flight.output
     assert same_flight(flight.folder, simulated(("loss30",)))
+
+
+def test_who_watches_changes_nothing(
+    fly: Callable[..., Flight],
+    simulated: Callable[..., Path],
+    ftcc: Callable[..., Any],
+    environment: dict[str, str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One reads for a while and leaves, one never reads."""
+    monkeypatch.setenv("FTCC_RUNTIME_DIR", environment["FTCC_RUNTIME_DIR"])
+    flight = fly("containment", "--speed", "max", "--duration", DURATION, "--seed", "1", "--hold", "--pack", "auto")
+    flight.wait_until(lambda: feed_path(flight.folder.name).exists() and "held" in flight.output)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as idle:
+        idle.connect(str(feed_path(flight.folder.name)))
+        assert ftcc("resume").returncode == 0
+        seen = [snapshot.t for snapshot, _ in zip(watched(flight.folder.name), range(5), strict=False)]
+        assert flight.wait() == 0, flight.output
+    assert seen == sorted(seen)
+    assert len(seen) == 5
+    assert same_flight(flight.folder, simulated())
 
 
 @pytest.mark.parametrize("pack", ["3", "auto"])

@@ -1,0 +1,107 @@
+"""Watching a swarm: what the station offers arrives whole, and nobody who watches can hold it back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import socket
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from ftcc.groundside import feed as feed_module
+from ftcc.groundside.feed import Feed, decoded, encoded, feed_path, watched
+from ftcc.groundside.snapshot import Event, LinkState, Snapshot
+from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot
+
+
+@pytest.fixture
+def feed(request: pytest.FixtureRequest) -> Iterator[tuple[Feed, str]]:
+    name = f"test-{request.node.name[:20]}-{time.monotonic_ns()}"
+    made = Feed(name)
+    yield made, name
+    made.close()
+
+
+def stuck(name: str) -> socket.socket:
+    """A watcher that never reads."""
+    link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    link.connect(str(feed_path(name)))
+    return link
+
+
+def test_a_snapshot_arrives_as_it_was_sent() -> None:
+    sent = snapshot(21.0, HAPPENINGS)
+    assert decoded(encoded(sent)) == sent
+
+
+def test_what_is_not_known_arrives_as_not_known() -> None:
+    plain = snapshot(1.0)
+    state = dataclasses.replace(plain.uavs[1], truth={"z": math.nan}, links={2: LinkState(math.inf, 0, 0, False)})
+    arrived = decoded(encoded(Snapshot(1.0, {1: state}))).uavs[1]
+    assert math.isnan(arrived.truth["z"])
+    assert arrived.links[2].age == math.inf
+
+
+@pytest.mark.parametrize("line", [b"", b"{}\n", b"[1]\n", b'{"t": 1, "uavs": {"x": 1}, "events": []}\n'])
+def test_what_is_no_snapshot_is_refused(line: bytes) -> None:
+    with pytest.raises(ValueError, match=r"no snapshot|Expecting|invalid literal"):
+        decoded(line)
+
+
+def test_nothing_is_encoded_while_nobody_watches(feed: tuple[Feed, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(feed_module, "encoded", lambda _: pytest.fail("encoded for nobody"))
+    feed[0].offer(snapshot(1.0))
+
+
+def test_a_watcher_that_reads_gets_everything_from_then_on(feed: tuple[Feed, str]) -> None:
+    station, name = feed
+    got: list[Snapshot] = []
+    reader = threading.Thread(target=lambda: got.extend(watched(name)))
+    link = stuck(name)  # so that the first snapshots are sent at all
+    reader.start()
+    sent = list(flight(5.0))
+    for snap in sent:
+        station.offer(snap)
+        time.sleep(0.002)
+    station.close()
+    reader.join(5.0)
+    link.close()
+    assert got
+    assert got == sent[-len(got) :]
+
+
+def test_a_watcher_that_does_not_read_costs_nothing_and_misses_no_event(feed: tuple[Feed, str]) -> None:
+    station, name = feed
+    link = stuck(name)
+    told = [Event(t / 10.0, "info", f"event {t}") for t in range(2000)]
+    longest = 0.0
+    for event in told:
+        begun = time.perf_counter()
+        station.offer(snapshot(event.t, (event,)))
+        longest = max(longest, time.perf_counter() - begun)
+    # A millisecond, most of it the encoding; the machine may be busy.
+    assert longest < 0.5
+    arrived: list[Event] = []
+    link.settimeout(0.5)
+    lines = link.makefile("rb")
+    while len(arrived) < len(told):
+        station.offer(snapshot(300.0))
+        arrived += decoded(lines.readline()).events
+    assert arrived == told
+    link.close()
+
+
+def test_a_watcher_that_dies_is_forgotten(feed: tuple[Feed, str]) -> None:
+    station, name = feed
+    stuck(name).close()
+    for t in range(3):
+        station.offer(snapshot(float(t)))
+    assert station._watchers == []
+
+
+def test_a_swarm_that_is_gone_cannot_be_watched() -> None:
+    with pytest.raises(OSError, match="No such file"):
+        next(watched("nobody"))
