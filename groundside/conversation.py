@@ -77,7 +77,8 @@ class Conversation:
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         self._socket.bind((LOOPBACK, 0))
-        self._texts: dict[int, list[str]] = {}
+        self.texts: dict[int, list[str]] = {}
+        """STATUSTEXT of each UAV since the last command to it."""
 
     def close(self) -> None:
         """Free the port."""
@@ -145,7 +146,7 @@ class Conversation:
             self.send(uav, dialect.MAVLink_param_request_list_message(uav, AUTOPILOT))
             until = time.monotonic() + self._timeout
             while len(found) < count and time.monotonic() < until:
-                for message in self._receive(uav, until):
+                for message in self.receive(uav, until):
                     if message.get_type() == "PARAM_VALUE":
                         count = message.param_count
                         found[message.param_index] = (message.param_id, _value(message))
@@ -183,7 +184,7 @@ class Conversation:
         requests = [
             dialect.MAVLink_command_long_message(uav, AUTOPILOT, command, n, *given) for n in range(self._tries)
         ]
-        self._texts[uav] = []
+        self.texts[uav] = []
         name = dialect.enums["MAV_CMD"][command].name.removeprefix("MAV_CMD_")
         ack = self._ask(uav, requests, lambda m: m.get_type() == "COMMAND_ACK" and m.command == command, name)
         if ack.result != dialect.MAV_RESULT_ACCEPTED:
@@ -201,11 +202,13 @@ class Conversation:
 
     def _ask(self, uav: int, requests: list[Any], answers: Callable[[Any], bool], what: str) -> Any:
         """Send a request until it is answered; of several requests the next one each time."""
+        while select.select([self._socket], [], [], 0.0)[0]:
+            self.receive(uav, 0.0)  # what came before the question does not answer it
         for n in range(self._tries):
             self.send(uav, requests[min(n, len(requests) - 1)])
             until = time.monotonic() + self._timeout
             while time.monotonic() < until:
-                for message in self._receive(uav, until):
+                for message in self.receive(uav, until):
                     if answers(message):
                         return message
         seconds = self._tries * self._timeout
@@ -215,8 +218,8 @@ class Conversation:
         """Send a message to a UAV, and wait for nothing."""
         self._socket.sendto(self._codec.pack(message), (LOOPBACK, self.card(uav).port))
 
-    def _receive(self, uav: int, until: float) -> list[Any]:
-        """The messages of one UAV that come next; [] at the latest at ``until``."""
+    def receive(self, uav: int, until: float) -> list[Any]:
+        """The messages of one UAV that come next; [] at the latest at ``until`` (monotonic, s)."""
         if not select.select([self._socket], [], [], max(0.0, until - time.monotonic()))[0]:
             return []
         datagram, sender = self._socket.recvfrom(4096)
@@ -225,15 +228,15 @@ class Conversation:
         messages = [m for m in self._codec.parse(datagram) if m.get_srcSystem() == uav]
         for message in messages:
             if message.get_type() == "STATUSTEXT":
-                self._texts.setdefault(uav, []).append(message.text)
+                self.texts.setdefault(uav, []).append(message.text)
         return messages
 
     def _reason(self, uav: int) -> str:
         """What the UAV says about a refusal."""
         until = time.monotonic() + _AFTERTHOUGHT
-        while not self._texts.get(uav) and time.monotonic() < until:
-            self._receive(uav, until)
-        return self._texts[uav][-1] if self._texts.get(uav) else "no reason given"
+        while not self.texts.get(uav) and time.monotonic() < until:
+            self.receive(uav, until)
+        return self.texts[uav][-1] if self.texts.get(uav) else "no reason given"
 
 
 def _value(message: Any) -> float:

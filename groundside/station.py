@@ -14,8 +14,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-
 from ftcc.groundside.conversation import Conversation, NoAnswerError, RefusedError, StationError
 from ftcc.link.failures import KINDS, UNITS
 from ftcc.link.mavlink import AUTOPILOT, dialect
@@ -226,25 +224,19 @@ class Station(Conversation):
 
     def attitude(self, uav: int, *, bank: float, alpha: float, beta: float = 0.0) -> None:
         """Have a UAV of an attitude scheme fly another attitude (rad) with respect to its velocity, for good."""
-        # They load numba, which no other command needs.
-        from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, V
-        from ftcc.sim.sensors import encode_state
+        # It loads numba, which no other command needs.
+        from ftcc.airside.references.attitude import attitude
 
         place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
-        ground = math.hypot(place.vx, place.vy)
-        asked, message = np.zeros(len(TRUTH)), np.zeros(13)
-        asked[V], asked[GAMMA], asked[CHI] = 1.0, math.atan2(-place.vz, ground), math.atan2(place.vy, place.vx)
-        asked[MU], asked[ALPHA], asked[BETA] = bank, alpha, beta
-        encode_state(asked, message)
+        gamma = math.atan2(-place.vz, math.hypot(place.vx, place.vy))
+        wanted = attitude(gamma, math.atan2(place.vy, place.vx), bank, alpha, beta)
         ignored = (
             dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
             | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
             | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
             | dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
         )
-        target = dialect.MAVLink_set_attitude_target_message(
-            0, uav, AUTOPILOT, ignored, tuple(message[:4].tolist()), 0.0, 0.0, 0.0, 0.0
-        )
+        target = dialect.MAVLink_set_attitude_target_message(0, uav, AUTOPILOT, ignored, wanted, 0.0, 0.0, 0.0, 0.0)
         self.set(uav, "COM_OF_LOSS_T", 0.0)
         self.send(uav, target)
         self.mode(uav, "offboard")

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftcc.link.compiled import compiled
+from ftcc.sim.plant import healthy
 
 __all__ = ["ATTITUDE", "INTERMITTENT", "OFF", "POSITION", "SLOW", "STUCK", "WRONG", "NavigationFault", "navigate"]
 
@@ -19,6 +20,9 @@ POSITION, ATTITUDE = range(2)
 
 WRONG, OFF, STUCK, SLOW, INTERMITTENT = range(5)
 """Kinds of `NavigationFault`."""
+
+_ROUNDING = 1e-9
+"""By how much a number of periods may be short of a whole one."""
 
 _FIRST = (7, 0)
 """The first field of the message that fails, by what fails."""
@@ -97,12 +101,12 @@ def _updated(fleet, i, part, kind, since, fault):
     if fleet.fresh[i, part] < 0.0:
         return True  # there is nothing yet that could be held
     if kind == SLOW:
-        count = int(since / fault[3])
+        count = int(since / fault[3] + _ROUNDING)
         if count != fleet.updates[i, part]:
             fleet.updates[i, part] = count
             return True
         return False
-    return kind == INTERMITTENT and since % fault[3] < fault[4] * fault[3]
+    return kind == INTERMITTENT and healthy(since, fault[3], fault[4])
 
 
 @compiled

@@ -35,6 +35,7 @@ __all__ = [
     "disturbance",
     "fault",
     "gust",
+    "healthy",
     "hold_speed",
     "latch",
     "stroke",
@@ -77,6 +78,9 @@ class Guards(NamedTuple):
     sideslip: float
     """rad."""
 
+
+_ROUNDING = 1e-9
+"""By how much a time may be short of the phase that it belongs to, s."""
 
 WRONG, STUCK, INTERMITTENT = range(3)
 """Kinds of `Fault`."""
@@ -229,6 +233,12 @@ def _onset(since: float, rate: float) -> float:
 
 
 @compiled
+def healthy(since, period, duty):
+    """Whether what fails now and then is right at ``since`` (s) after its failure began."""
+    return (since + _ROUNDING) % period < duty * period
+
+
+@compiled
 def fault(fleet, i, actuator, time):
     """Effectiveness, bias and largest rate of an actuator: those of its latest fault."""
     latest = -1
@@ -246,7 +256,7 @@ def fault(fleet, i, actuator, time):
             fleet.held[i, actuator] = fleet.deflection[i, actuator]
         return 0.0, fleet.held[i, actuator], fleet.rate[i, actuator]
     fleet.held_since[i, actuator] = math.inf
-    if kind == INTERMITTENT and since % row[8] < row[9] * row[8]:
+    if kind == INTERMITTENT and healthy(since, row[8], row[9]):
         return 1.0, 0.0, fleet.rate[i, actuator]
     effectiveness = 1.0 + (row[2] - 1.0) * _onset(since, row[4])
     bias = row[3] * _onset(since, row[5])

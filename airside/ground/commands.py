@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink
     from ftcc.link.ground import Peer
 
-__all__ = ["COMMANDS", "Answer", "Request", "lead", "read_request", "set_mode"]
+__all__ = ["COMMANDS", "READING", "Answer", "Request", "lead", "read_request", "set_mode"]
 
 _M = dialect
 ACCEPTED = _M.MAV_RESULT_ACCEPTED
@@ -112,7 +112,7 @@ def set_mode(link: GroundLink, mode: int) -> Answer:
         if why:
             return Answer(DENIED, why)
         if not link.offboard.fresh():
-            return Answer(BUSY, "offboard: send targets first")
+            return Answer(BUSY, link.offboard.refused_target or "offboard: send targets first")
     if mode == MISSION and seat.leader:
         release_from_ground(seat.autopilots.profile_commands[seat.i])
     if mode == MISSION:
@@ -251,3 +251,14 @@ COMMANDS: dict[int, Callable[[Any, Request], Answer | None]] = {
     _M.MAV_CMD_DO_SET_HOME: _never("home belongs to the scenario"),
 }
 """What is done with a command; None as an answer: it comes later. Any other command is unsupported."""
+
+READING = frozenset(
+    {
+        _M.MAV_CMD_SET_MESSAGE_INTERVAL,
+        _M.MAV_CMD_GET_MESSAGE_INTERVAL,
+        _M.MAV_CMD_REQUEST_MESSAGE,
+        _M.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+        _M.MAV_CMD_GET_HOME_POSITION,
+    }
+)
+"""Those that change nothing about the UAV: not worth logging, and answered for one that is lost, too."""

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from ftcc.airside.ground.commands import COMMANDS, Answer, Request
+from ftcc.airside.ground.commands import COMMANDS, READING, Answer, Request
 from ftcc.airside.ground.failures import Failures
 from ftcc.airside.ground.offboard import Offboard
 from ftcc.airside.ground.parameters import Parameters
@@ -161,7 +161,7 @@ class GroundLink:
         handle = COMMANDS.get(request.command)
         if handle is None:
             answer: Answer | None = Answer(_M.MAV_RESULT_UNSUPPORTED)
-        elif not self.seat.alive:
+        elif not self.seat.alive and request.command not in READING:
             answer = Answer(_M.MAV_RESULT_DENIED, "this UAV is lost")
         else:
             answer = handle(self, request)
@@ -186,6 +186,8 @@ class GroundLink:
                 self.seat.note(answer.event, "info", request.who, "accepted")
         elif answer.text:
             self.text(_M.MAV_SEVERITY_WARNING, answer.text, request.peer)
+            if request.command in READING:
+                return
             name = _M.enums["MAV_CMD"][request.command].name.removeprefix("MAV_CMD_")
             outcome = _M.enums["MAV_RESULT"][answer.result].name.removeprefix("MAV_RESULT_").lower()
             self.seat.note(f"{name} {outcome.replace('_', ' ')}: {answer.text}", "warning", request.who, outcome)

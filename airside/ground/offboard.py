@@ -34,7 +34,8 @@ class Offboard:
         self._references = of_plant(link.seat.scheme.plant)
         self._last = -math.inf
         self._target: tuple[float, ...] | None = None
-        self._told = ""
+        self.refused_target = ""
+        """Why the last target was not taken; empty if it was."""
 
     def refused(self) -> str:
         """Why this UAV takes no targets; empty if it does."""
@@ -75,11 +76,12 @@ class Offboard:
         seat = self._link.seat
         if seat.leader:
             return
-        row, why = self._references.command_from_ground(message, seat.autopilots.own[seat.i], seat.next_us)
+        clock = int(seat.next_us - seat.autopilots.held_us[seat.i])
+        row, why = self._references.command_from_ground(message, seat.autopilots.own[seat.i], clock)
         if why:
             self._complain(why)
             return
-        self._last = time.monotonic()
+        self._last, self.refused_target = time.monotonic(), ""
         if seat.autopilots.mode[seat.i] == OFFBOARD and tuple(row[1:]) != self._target:
             self._target = tuple(row[1:])
             seat.autopilots.reference_commands[seat.i, -1] = row
@@ -97,7 +99,7 @@ class Offboard:
         if message.coordinate_frame != _M.MAV_FRAME_LOCAL_NED or (altitude is None and speed is None):
             self._complain("target: local NED with altitude or forward speed")
             return
-        self._last = time.monotonic()
+        self._last, self.refused_target = time.monotonic(), ""
         wanted = (math.nan if altitude is None else altitude, math.nan if speed is None else speed)
         if seat.autopilots.mode[seat.i] == OFFBOARD and repr(wanted) != repr(self._target):
             answer = lead(self._link, altitude, speed)
@@ -107,6 +109,6 @@ class Offboard:
 
     def _complain(self, why: str) -> None:
         """Say once what is wrong with a target: they come many times a second."""
-        if why != self._told:
-            self._told = why
+        if why != self.refused_target:
+            self.refused_target = why
             self._link.text(_M.MAV_SEVERITY_WARNING, why)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.ground.seat import Seat
+from ftcc.airside.references.attitude import attitude
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
 from ftcc.link.mavlink import dialect, float_array
@@ -173,6 +174,12 @@ def _signal(seat: Seat, *names: str) -> float | None:
 
 def _attitude_target(seat: Seat) -> Any:
     own = fields(Own, seat.autopilots.own[seat.i])
+    if seat.scheme.plant == "attitude" and not seat.leader:
+        mu, alpha, beta = seat.autopilots.reference[seat.i, :3].tolist()
+        rates = 0b111
+        return _M.MAVLink_attitude_target_message(
+            _stamp(seat), rates, attitude(own.gamma, own.chi, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
+        )
     pitch = own.theta if seat.leader else _signal(seat, "theta_d")
     rate = 0.0 if seat.leader else _signal(seat, "q_d")
     ignored = _M.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE | _M.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.flight_path import Own, decode_state
 from ftcc.link.compiled import compiled, fields
+from ftcc.link.mavlink import dialect
 
-__all__ = ["Command", "Filter", "Reference", "refer", "stand"]
+__all__ = ["Command", "Filter", "Reference", "attitude", "command_from_ground", "refer", "stand"]
 
 
 class Reference(NamedTuple):
@@ -73,3 +80,54 @@ def stand(reference, period_us):
     for axis in range(3):
         reference[3 + axis] = 0.0
     return True
+
+
+_BANK, _ALPHA, _BETA = 1.05, (-0.15, 0.26), 0.26
+"""Targets that are taken, rad: a bank of 60 deg, an angle of attack short of the stall, 15 deg of sideslip (chosen)."""
+_UNIT = 0.01
+"""By how much the length of a quaternion may differ from 1."""
+
+
+def attitude(gamma: float, chi: float, mu: float, alpha: float, beta: float) -> tuple[float, float, float, float]:
+    """Quaternion body to north-east-down of an attitude (rad) with respect to the flight path: of `decode_state`."""
+    q = (math.cos(0.5 * chi), 0.0, 0.0, math.sin(0.5 * chi))
+    for axis, angle in ((2, gamma), (1, mu), (3, -beta), (2, alpha)):
+        turn = [math.cos(0.5 * angle), 0.0, 0.0, 0.0]
+        turn[axis] = math.sin(0.5 * angle)
+        q = _product(q, turn)
+    return q
+
+
+def _product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def command_from_ground(message: Any, own: NDArray[np.float64], now_us: int) -> tuple[Command | None, str]:
+    """What a SET_ATTITUDE_TARGET asks for, by the flight path of ``own``; or None and why it is refused.
+
+    Of rates and thrust no notice is taken: the filter makes the rates, and the laws leave the thrust alone.
+    """
+    if message.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
+        return None, "attitude target: without an attitude"
+    q = [float(value) for value in message.q]
+    length = math.sqrt(sum(value * value for value in q))
+    if not abs(length - 1.0) < _UNIT:  # also where it is not a number
+        return None, "attitude target: no unit quaternion"
+    path = Own(*own.tolist())
+    state = np.zeros(13)
+    state[:4] = [value / length for value in q]
+    state[10] = math.cos(path.gamma) * math.cos(path.chi)
+    state[11] = math.cos(path.gamma) * math.sin(path.chi)
+    state[12] = -math.sin(path.gamma)
+    seen = np.zeros(len(Own._fields))
+    decode_state(state, 0.0, np.zeros(4), seen)
+    wanted = Own(*seen.tolist())
+    if abs(wanted.mu) > _BANK or not _ALPHA[0] <= wanted.alpha <= _ALPHA[1] or abs(wanted.beta) > _BETA:
+        shown = [round(math.degrees(angle)) for angle in (wanted.mu, wanted.alpha, wanted.beta)]
+        return None, "target {}, {}, {} deg: outside the envelope".format(*shown)
+    return Command(now_us / 1e6, wanted.mu, wanted.alpha, wanted.beta), ""

@@ -9,12 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from ftcc.airside.process import Crew
+from ftcc.airside.scheme import Flight
+from ftcc.airside.spec import Neighbour
 from ftcc.link.gate import Gate, Go, Limit, Pace, Release, Stop
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint, read_command, state_messages
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
 from ftcc.sim.sensors import STATE_MESSAGE
-from tests.swarm import autopilot, timing
+from tests.swarm import GRAPH, autopilot, timing
+
+FLIGHT = Flight(GRAPH, 0.01, 0.05, 0.05, 2.0, False)
+"""What the law's conditions are checked against."""
 
 
 def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarray:
@@ -26,17 +31,29 @@ def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarr
 
 
 class Bench:
-    """The crew, its sockets and its gate; as a context it flies in a thread."""
+    """The crew, its sockets and its gate; as a context it flies in a thread. Its ``neighbours`` never say anything."""
 
-    def __init__(self, folder: Path, ticks: int, lockstep: bool = True) -> None:
-        self.block = reserve((1,))
+    def __init__(
+        self,
+        folder: Path,
+        ticks: int,
+        lockstep: bool = True,
+        neighbours: tuple[int, ...] = (),
+        key: Path | None = None,
+    ) -> None:
+        uavs = (1, *neighbours)
+        self.block = reserve(uavs)
         ports = self.block.of(1)
         self.timing = timing("flight", ticks / 100)
-        setting = Setting("test", self.timing, lockstep, {1: ports}, {1: 1}, self.block.station, folder)
+        every = {uav: self.block.of(uav) for uav in uavs}
+        alone = {uav: uav for uav in uavs}
+        setting = Setting("test", self.timing, lockstep, every, alone, self.block.station, folder, key=key)
         self.launcher, pipe = Pipe()
         self.vehicle = Endpoint(1, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
         self.station = Endpoint(STATION, 1, self.block.station)
-        self.crew = Crew([autopilot(1, neighbours=())], setting, Gate(pipe))
+        spec = autopilot(1, neighbours=tuple(Neighbour(uav, 0.5) for uav in neighbours), flight=FLIGHT)
+        # Nobody waits for neighbours that are not there.
+        self.crew = Crew([spec], setting, Gate(pipe, gone=set(neighbours)))
         self._thread = threading.Thread(target=self.crew.fly)
 
     def __enter__(self) -> Bench:
