@@ -133,7 +133,15 @@ class Conversation:
             return before
         raw = struct.unpack("<f", struct.pack("<i", int(value)))[0] if integer else value
         message = dialect.MAVLink_param_set_message(uav, AUTOPILOT, name.encode(), raw, kind)
-        after, _ = self._parameter(uav, message, name)
+        self.texts[uav] = []
+
+        def answers(heard: Any) -> bool:
+            """With the value asked for, or with the former one behind a reason: others answer earlier questions."""
+            if heard.get_type() != "PARAM_VALUE" or heard.param_id.upper() != name.upper():
+                return False
+            return bool(self.texts[uav]) or np.float32(_value(heard)) == np.float32(value)
+
+        after = _value(self._ask(uav, [message], answers, f"parameter {name}"))
         if np.float32(after) != np.float32(value):
             raise RefusedError(f"UAV {uav}: {name} = {value:g} is refused: {self._reason(uav)}; in force is {after:g}")
         return after

@@ -175,6 +175,8 @@ def fly(
             if flight.dashboard:
                 flight.dashboard.close()
             ports.release()
+    if station.strangers:
+        log.write(station.t, f"dropped {station.strangers} datagrams of strangers at the station")
     log.write(
         station.t,
         f"flight over: {swarm.outcome.late} of {swarm.outcome.ticks} ticks late",
