@@ -50,7 +50,7 @@ class Conversation:
     key : Path, optional
         Key file; default: that of the swarm, where its links are signed.
     timeout : float
-        Wall time to wait for an answer before asking again, s.
+        Wall time to wait for an answer before asking again, s; twice as long each time.
     tries : int
         How often to ask.
 
@@ -61,7 +61,7 @@ class Conversation:
     """
 
     def __init__(
-        self, swarm: str | Entry | None = None, *, key: Path | None = None, timeout: float = 0.6, tries: int = 3
+        self, swarm: str | Entry | None = None, *, key: Path | None = None, timeout: float = 0.4, tries: int = 4
     ) -> None:
         try:
             self.entry = swarm if isinstance(swarm, Entry) else find(swarm)
@@ -214,12 +214,12 @@ class Conversation:
             self.receive(uav, 0.0)  # what came before the question does not answer it
         for n in range(self._tries):
             self.send(uav, requests[min(n, len(requests) - 1)])
-            until = time.monotonic() + self._timeout
+            until = time.monotonic() + self._timeout * 2**n
             while time.monotonic() < until:
                 for message in self.receive(uav, until):
                     if answers(message):
                         return message
-        seconds = self._tries * self._timeout
+        seconds = self._timeout * (2**self._tries - 1)
         raise NoAnswerError(f"UAV {uav} of swarm {self.entry.name} does not answer ({what}, {seconds:.1f} s)")
 
     def send(self, uav: int, message: Any) -> None:

@@ -38,7 +38,7 @@ def flying(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **setting: Any) -> I
         card = Card(1, "follower", bench.block.of(1).ground, (2, 6))
         entry = Entry("bench", 1, "containment", str(tmp_path), (card,), None, (0, 0), None, 0.0)
         key = setting.get("key")
-        with Station(entry, timeout=0.5, tries=2, key=key) as station:
+        with Station(entry, timeout=0.3, tries=2, key=key) as station:
             yield bench, station
 
 
