@@ -137,8 +137,9 @@ def test_streams_flow_at_the_rates_that_are_asked_for(bench, station):
     while messages := station.receive(1, time.monotonic() + 0.05):
         stamps += [m.time_boot_ms for m in messages if m.get_type() == "ATTITUDE"]
         assert not [m for m in messages if m.get_type() == "VFR_HUD"]
-    assert 10 <= len(stamps) <= 21
-    assert [stamp % 50 for stamp in stamps[1:]] == [0] * (len(stamps) - 1)
+    # At 20 Hz of simulated time, but for a tick by which the wall clock may be behind.
+    assert len(stamps) in (19, 20, 21)
+    assert set(np.diff(stamps)) <= {40, 50, 60}
 
 
 # Parameters.
