@@ -38,6 +38,10 @@ _MEANINGS = {
     "alpha": ("Angle of attack", "rad"),
     "beta": ("Sideslip", "rad"),
 }
+_REFERENCES = ("_r", "_ref", "_d", "hat", "_hat", "_id")
+"""How the signal is called that says what a state should be, the nearest to the law first."""
+_NO_LIMIT = 2.0 * math.pi
+"""Limits of angles beyond this stand for none, rad."""
 _MOST = 6
 """Panels in a group."""
 
@@ -99,7 +103,11 @@ def _motion(subject: Subject) -> list[Panel]:
     panels = []
     for name in _MOTION[subject.family]:
         meaning, unit = _MEANINGS[name]
-        references = [r for r in (f"{name}_r", f"{name}_d", f"{name}hat", f"{name}_hat", f"{name}_id") if r in names]
+        references = [
+            r
+            for r in (f"{name}_r", f"{name}_ref", f"{name}_d", f"{name}hat", f"{name}_hat", f"{name}_id")
+            if r in names
+        ]
         band = name == "z" and subject.family == "containment"
         panels.append(
             Panel(
@@ -132,7 +140,7 @@ def _commands(subject: Subject) -> list[Panel]:
             unit=unit_of(name),
             value=("acting", name),
             second=("command", name),
-            limits=limit,
+            limits=limit if unit_of(name) != "rad" or max(map(abs, limit)) < _NO_LIMIT else None,
             notes=("thin: commanded", "gray: limits"),
         )
         for name, limit in subject.limits.items()

@@ -35,7 +35,7 @@ _REFERENCES: dict[str, dict[str, tuple[str, ...]]] = {
     "containment": {"x": ("x_hat",), "z": ("z_r", "zhat", "z_hat")},
     "formation": {"z": ("z_r", "z_d", "zhat", "z_id")},
     "attitude": {"mu": ("mu_d",), "alpha": ("alpha_d",), "beta": ("beta_d",)},
-    "fire": {"x": ("x_d",), "y": ("y_d",), "z": ("z_d",)},
+    "fire": {"x": ("x_ref",), "y": ("y_ref",), "z": ("z_ref",)},
 }
 """Signals that say where a UAV should be, or how it should lie in the air, by the true state that they stand for."""
 

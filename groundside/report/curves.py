@@ -43,7 +43,7 @@ class Curve:
 
 def drawable(panel: Panel, flight: Flown) -> bool:
     """Whether a flight has all that a panel shows, and reaches its window."""
-    asked = [e for e in (panel.y, panel.x, panel.bound, panel.true) if e is not None]
+    asked = [e for e in (panel.y, panel.x, panel.bound, panel.true, panel.reference) if e is not None]
     return has(flight, asked, panel.pairs) and (panel.window is None or last_time(flight) > panel.window[0])
 
 

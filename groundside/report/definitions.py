@@ -42,6 +42,7 @@ class Panel(Strict):
     pairs: list[tuple[Id, Id]] | None = Field(None, description="draw y of the first minus y of the second instead")
     bound: str | None = Field(None, description="expression; drawn dashed at plus and minus its value")
     true: str | None = Field(None, description="expression of the true value that y estimates; drawn thin and dark")
+    reference: str | None = Field(None, description="expression of what y follows; drawn thin in the same colour")
     limits: str | None = Field(None, description="actuator whose limits are drawn")
     window: tuple[float, float] | None = Field(None, description="s; a detail, beside the others")
     shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
@@ -150,7 +151,7 @@ def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
     wrong = []
     for figure in sheet.figures:
         expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]
-        expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true) if e is not None]
+        expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true, p.reference) if e is not None]
         for expression in dict.fromkeys(expressions):
             try:
                 check_expression(expression, ["t", *columns])

@@ -39,6 +39,8 @@ _WIDTH, _ROW, _LEGEND = 7.2, 1.9, 0.35
 """Inches: of a figure, of a row of panels, of the legend."""
 _IN_A_ROW = 3
 """Details beside each other."""
+_FAR = 3.0
+"""How far beyond the curves a limit may be and still be drawn, in heights of the axes."""
 _COLUMNS = 700
 """Columns of a figure's width, of each of which the least and the greatest value are drawn."""
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
@@ -124,9 +126,7 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
         if n == 0:
             _draw_bounds(axes, panel, flight)
     if panel.limits is not None:
-        follower = next(spec for spec in flights[0].mission.vehicles if spec.kind != "reference_point")
-        for limit in follower.limits[SLOT[panel.limits]]:
-            axes.axhline(limit, color=hexadecimal(GRAY), linewidth=0.8, linestyle=":")
+        _draw_limits(axes, panel.limits, flights[0])
     if panel.x == "t" and not several:
         _mark_events(axes, panel, flights[0])
     unit = f", {_pretty(panel.unit)}" if panel.unit and panel.unit != "-" else ""
@@ -134,8 +134,21 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
     axes.margins(x=0.01)
 
 
+def _draw_limits(axes: Axes, actuator: str, flight: Flown) -> None:
+    """An actuator's limits, unless they are so far away that nothing else could be seen."""
+    follower = next(spec for spec in flight.mission.vehicles if spec.kind != "reference_point")
+    low, high = axes.get_ylim()
+    for limit in follower.limits[SLOT[actuator]]:
+        if low - _FAR * (high - low) <= limit <= high + _FAR * (high - low):
+            axes.axhline(limit, color=hexadecimal(GRAY), linewidth=0.8, linestyle=":")
+
+
 def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
-    """Bounds dashed, both ways; true values dotted in the colour of text."""
+    """Bounds dashed, both ways; true values dotted in the colour of text; references thin."""
+    tints = colors(flight.mission.uavs)
+    if panel.reference is not None:
+        for curve in curves_of(panel.reference, flight, panel.uavs, None, panel.window, panel.x):
+            axes.plot(*_thinned(curve.x, curve.y), "--", color=hexadecimal(tints[curve.uav]), linewidth=0.5, zorder=2)
     if panel.bound is not None:
         for curve in curves_of(panel.bound, flight, panel.uavs, None, panel.window, panel.x):
             x, y = _thinned(curve.x, np.abs(curve.y))
@@ -168,6 +181,8 @@ def _legend(made: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> Non
         entries.append(Line2D([], [], color=gray, linestyle="--", label="bound"))
     if any(panel.limits for panel in panels):
         entries.append(Line2D([], [], color=gray, linestyle=":", label="limit"))
+    if any(panel.reference for panel in panels):
+        entries.append(Line2D([], [], color=_INK, linestyle="--", linewidth=0.5, label="reference"))
     if any(panel.true for panel in panels):
         entries.append(Line2D([], [], color=_INK, linestyle=":", label="true value"))
     if entries:
