@@ -1,0 +1,117 @@
+"""A flight's recording in the viewer, without a screen: blueprint, timeline, entities, values; a killed run, too."""
+
+from __future__ import annotations
+
+import io
+import socket
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from ftcc.groundside import Run
+from tests.sitl.conftest import Flight
+
+DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
+UAVS = range(1, 9)
+
+
+@pytest.fixture
+def viewer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Rerun's own viewer, drawn in software."""
+    from rerun.experimental import ViewerClient
+
+    monkeypatch.setenv("CI", "true")  # no usage statistics
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    client = ViewerClient.spawn(headless=True, port=port, memory_limit="1GB", server_memory_limit="128MB")
+    yield client
+    client.quit()
+
+
+def altitudes(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) and altitudes (n, 8) in a recording of the dashboard."""
+    times: list[float] = []
+    values: list[list[float]] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a killed recording has no footer
+        chunks = rr.chunk.RrdReader(path).stream().to_chunks()
+    for chunk in chunks:
+        if str(chunk.entity_path) == "/plots/motion/z/uavs" and not chunk.is_static:
+            batch = chunk.to_record_batch()
+            times += [ns / 1e9 for ns in batch["t"].cast("int64").to_pylist()]
+            values += [row[: len(UAVS)] for row in batch["Scalars:scalars"].to_pylist()]
+    order = np.argsort(times)
+    return np.array(times)[order], np.array(values)[order]
+
+
+def assert_the_recording_shows_what_was_flown(flight: Flight) -> float:
+    """Altitudes in the view are those of the run's signals; the last time that the view shows, s."""
+    run = Run(flight.folder)
+    times, shown = altitudes(flight.folder / "swarm.rrd")
+    # The station draws the newest it has heard of each: half a second old at most, at climb rates up to 3 m/s.
+    slack = 0.02 + 3.0 * 0.5
+    for i, uav in enumerate(UAVS):
+        t, z = run.column("t", uav), run.column("z", uav)
+        t, z = t[np.isfinite(z)], z[np.isfinite(z)]
+        within = times <= t[-1]
+        assert within.sum() > 3
+        np.testing.assert_allclose(shown[within, i], np.interp(times[within], t, z), atol=slack)
+    return float(times[-1])
+
+
+def picture(viewer: Any) -> np.ndarray:
+    image = pytest.importorskip("PIL.Image")
+    return np.asarray(image.open(io.BytesIO(viewer.take_screenshot())).convert("RGB")).astype(int)
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(not DRIVERS, reason="needs the system package mesa-vulkan-drivers")
+def test_a_flight_in_lockstep_opens_with_its_blueprint(fly: Callable[..., Flight], viewer: Any) -> None:
+    flight = fly("demo", "--speed", "max", "--duration", "20", "--pack", "auto")
+    assert flight.wait() == 0, flight.output
+    assert assert_the_recording_shows_what_was_flown(flight) == pytest.approx(20.0, abs=0.5)
+
+    viewer.open(str(flight.folder / "swarm.rrd"))
+    state = viewer.get_state()
+    (recording,) = state.recordings
+    timeline = next(timeline for timeline in recording.timelines if timeline.name == "t")
+    assert timeline.time_type == "duration"
+    assert timeline.end == pytest.approx(20e9, abs=0.5e9)
+    assert recording.current_timeline == "t"
+    views = {view.name: view.view_class for view in state.views}
+    assert views["Swarm"] == "TextDocument"
+    assert views["Events"] == "TextLog"
+    assert next(kind for name, kind in views.items() if name.startswith("Swarm about")) == "3D"
+    assert next(kind for name, kind in views.items() if name.startswith("Links")) == "2D"
+    for plot in ("Altitude, m", "Altitude tracking error S1, m", "Thrust, N", "Elevator, rad", "Estimated disturbance"):
+        assert next(kind for name, kind in views.items() if name.startswith(plot)) == "TimeSeries"
+    assert not [report for view in state.views for report in view.reports]
+
+    entities = {str(entity.entity_path) for entity in viewer.get_recording_schema().entities}
+    for uav in UAVS:
+        assert f"/world/uav/{uav}/airframe" in entities
+    assert {"/world/links", "/graph/links", "/world/hull", "/swarm"} <= entities
+
+    pictures = []
+    for t in (5.0, 15.0):
+        viewer.set_time("t", duration=t, play_state="paused")
+        pictures.append(picture(viewer))
+    colored = pictures[0].max(axis=2) - pictures[0].min(axis=2) > 40
+    assert colored.mean() > 0.002, "the picture is blank"
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 40).mean() > 0.002, "the picture stands still"
+
+
+def test_the_view_of_a_killed_flight_is_readable(fly: Callable[..., Flight]) -> None:
+    flight = fly("demo", "--speed", "1", "--pack", "auto", "--viewer", "none")
+    flight.wait_until_flying()
+    # The view is written in pieces of two seconds.
+    flight.wait_until(lambda: len(altitudes(flight.folder / "swarm.rrd")[0]) > 10)
+    flight.process.kill()
+    flight.process.wait()
+    assert assert_the_recording_shows_what_was_flown(flight) > 1.0
