@@ -58,8 +58,10 @@ class Reading(Strict):
     window: tuple[float, float] | None = Field(None, description="s; default: the whole flight")
     unit: str = ""
     monograph: tuple[float, float] = Field(description="lowest and highest value")
-    kind: Literal["extremes", "within"] = Field(
-        "extremes", description='"extremes": values that are reached; "within": an axis or a bound that holds them'
+    kind: Literal["extremes", "within", "lowest", "highest"] = Field(
+        "extremes",
+        description='"extremes": both values are reached; "within": an axis or a bound that holds all; "lowest" and '
+        '"highest": the lowest or highest value lies between the two',
     )
     remark: str = Field("", description="a difference that is known, and its cause")
 

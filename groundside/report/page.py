@@ -129,7 +129,7 @@ def compared_section(
         rows.append([*cells, verdict, Cell(one.difference)])
     before = [
         f"What {source} shows in its figures and says of them, against this run: {agreed} of {len(rows)} agree, "
-        f"{differing} differ. A value that is read off a plot agrees within a fifth of its range."
+        f"{differing} differ. A value that is read off a plot agrees within a quarter of its range."
     ]
     if form != "monograph" or variants:
         what = f"form {form}" + (f", variant {', '.join(variants)}" if variants else "")

@@ -13,7 +13,7 @@ from ftcc.groundside.report.definitions import Reading, Sheet
 
 __all__ = ["Compared", "compare"]
 
-_NEAR = 0.2
+_NEAR = 0.25
 """How far a value may be from one that was read off a plot, as a share of the values' span."""
 _INSIDE = 0.02
 """How far a value may be beyond an axis, likewise: ticks are rounded."""
@@ -42,7 +42,7 @@ def compare(sheet: Sheet, flight: Flown) -> Iterator[Compared]:
 
 def _compared(number: str, reading: Reading, flight: Flown) -> Compared:
     low, high = reading.monograph
-    sense = "" if reading.kind == "extremes" else "within "
+    sense = {"extremes": "", "within": "within ", "lowest": "lowest ", "highest": "highest "}[reading.kind]
     monograph = f"{sense}{_span(low, high)}"
 
     def result(measured: str, agrees: bool | None, difference: str) -> Compared:
@@ -60,7 +60,9 @@ def _compared(number: str, reading: Reading, flight: Flown) -> Compared:
         return result("-", None, "nothing recorded in the window")
     least, greatest = min(float(y.min()) for y in values), max(float(y.max()) for y in values)
     span = high - low or abs(high) or 1.0
-    if reading.kind == "within":
+    if reading.kind != "extremes":
+        one = {"lowest": (least, least), "highest": (greatest, greatest)}
+        least, greatest = one.get(reading.kind, (least, greatest))
         beyond = max(low - least, greatest - high)
         agrees = beyond <= _INSIDE * span
         difference = "" if agrees else f"{beyond:.2g} {reading.unit} beyond"
