@@ -14,6 +14,7 @@ import numpy as np
 from ftcc.airside.references.profiles import Profile, climb_range, largest_acceleration
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
+from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Start
 from ftcc.link.actuators import ACTUATORS, SLOT, unit_of
@@ -64,7 +65,7 @@ class Findings:
 
 
 def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
-    """The scheme, which must have the form that is asked for."""
+    """The scheme, which must have the form that is asked for and signals with names of their own."""
     try:
         scheme = find_scheme(scenario.plan.scheme)
     except (LookupError, SchemeError) as error:
@@ -74,6 +75,11 @@ def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
     if scenario.form not in scheme.forms:
         findings.refuse(
             f"form = {scenario.form!r}: scheme {scheme.name} has no such form; it has {', '.join(scheme.forms)}"
+        )
+    taken = [signal.name for signal in scheme.signals if signal.name in LEADING]
+    if taken:
+        findings.refuse(
+            f"scheme = {scheme.name!r}: signals {', '.join(taken)}: every recording has columns of these names already"
         )
     findings.stop_if_refused()
     return scheme

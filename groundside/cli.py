@@ -45,6 +45,7 @@ def list_all() -> None:
     from rich.table import Table
 
     from ftcc.airside import schemes
+    from ftcc.airside.scheme import SchemeError
     from ftcc.groundside.scenario import forms_and_variants, read, shipped
 
     def table(*headings: str) -> Table:
@@ -55,8 +56,12 @@ def list_all() -> None:
 
     laws = table("scheme", "what it is", "forms")
     for name in schemes.names():
-        scheme = schemes.find(name)
-        laws.add_row(name, scheme.title, ", ".join(scheme.forms))
+        try:
+            scheme = schemes.find(name)
+        except SchemeError as error:
+            laws.add_row(name, str(error), "-")
+        else:
+            laws.add_row(name, scheme.title, ", ".join(scheme.forms))
     scenarios = table("scenario", "what it flies", "s", "forms", "variants")
     for name, path in shipped().items():
         document = read(path)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from ftcc.groundside import Run, ScenarioError, load, resolve
+from ftcc.groundside.cli import list_all
 from ftcc.groundside.dashboard.plots import tracking_errors
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.simulate import PlainPython, simulate
@@ -120,13 +121,20 @@ def test_the_walk_through_quotes_the_example_as_it_is() -> None:
         assert any(quote in source for source in sources), quote
 
 
-def test_a_package_whose_scheme_is_none_is_told_what_it_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install(EXAMPLE, tmp_path, {"half_a_scheme": '"""Half a scheme."""\n'})
+def test_a_package_whose_scheme_is_none_is_told_what_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    taken = (EXAMPLE / "altitude_consensus.py").read_text().replace('Q("z_ref"', 'Q("z"')
+    install(EXAMPLE, tmp_path, {"half_a_scheme": '"""Half a scheme."""\n', "taken_name": taken})
     monkeypatch.syspath_prepend(str(tmp_path))
     forget_schemes()
     try:
         with pytest.raises(ScenarioError, match=r"scheme half_a_scheme .*lacks Gains, State, Output"):
             mission("half_a_scheme")
+        with pytest.raises(ScenarioError, match="signals z: every recording has columns of these names already"):
+            mission("taken_name")
+        list_all()
+        assert "lacks Gains, State, Output" in capsys.readouterr().out
     finally:
         monkeypatch.undo()
         forget_schemes()
