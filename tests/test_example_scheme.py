@@ -13,7 +13,8 @@ import pytest
 
 from ftcc.groundside import Run, ScenarioError, load, resolve
 from ftcc.groundside.cli import list_all
-from ftcc.groundside.dashboard.plots import tracking_errors
+from ftcc.groundside.dashboard.panels import panels_of
+from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.simulate import PlainPython, simulate
 from tests.guests import EXAMPLE, forget_schemes, install
@@ -27,8 +28,8 @@ PLAIN = (
     (EXAMPLE / "altitude_consensus.py")
     .read_text()
     .replace(
-        "S1, S2 = own.z - s.z_ref, own.V - reference.V",
-        'errors = {"z": own.z - s.z_ref, "V": own.V - reference.V}\n    S1, S2 = errors["z"], errors["V"]',
+        "S1, S2 = own.z - s.z_r, own.V - reference.V",
+        'errors = {"z": own.z - s.z_r, "V": own.V - reference.V}\n    S1, S2 = errors["z"], errors["V"]',
     )
 )
 
@@ -81,13 +82,15 @@ def test_what_it_claims_holds(installed: Path, tmp_path: Path) -> None:
 
 def test_it_is_recorded_and_plotted_as_its_file_declares(flown: Run) -> None:
     columns = flown.columns
-    assert [columns[name].unit for name in ("z_ref", "theta_0", "elevator_0", "thrust_0", "S1", "S2")] == [
+    assert [columns[name].unit for name in ("z_r", "theta_0", "elevator_0", "thrust_0", "S1", "S2")] == [
         "m", "rad", "rad", "N", "m", "m/s",
     ]  # fmt: skip
     assert columns["S1"].meaning == "altitude tracking error"
-    assert [signal.name for signal in tracking_errors(flown.mission.scheme.signals)] == ["S1", "S2"]
-    z, z_ref, S1 = (flown.column(name, 2) for name in ("z", "z_ref", "S1"))
-    assert abs(z - z_ref - S1).max() < 1e-3, "errors of the law are those of the aircraft, but for float32"
+    tracking = panels_of(Subject.of(flown.mission))["Tracking"]
+    assert {panel.value for panel in tracking} >= {("truth", "z"), ("signals", "S1"), ("signals", "S2")}
+    assert tracking[0].second == ("signals", "z_r")
+    z, z_r, S1 = (flown.column(name, 2) for name in ("z", "z_r", "S1"))
+    assert abs(z - z_r - S1).max() < 1e-3, "errors of the law are those of the aircraft, but for float32"
 
 
 def test_it_is_listed_and_flies_as_processes_bit_for_bit(installed: Path, flown: Run, tmp_path: Path) -> None:
@@ -124,7 +127,7 @@ def test_the_walk_through_quotes_the_example_as_it_is() -> None:
 def test_a_package_whose_scheme_is_none_is_told_what_it_lacks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    taken = (EXAMPLE / "altitude_consensus.py").read_text().replace('Q("z_ref"', 'Q("z"')
+    taken = (EXAMPLE / "altitude_consensus.py").read_text().replace('Q("z_r"', 'Q("z"')
     install(EXAMPLE, tmp_path, {"half_a_scheme": '"""Half a scheme."""\n', "taken_name": taken})
     monkeypatch.syspath_prepend(str(tmp_path))
     forget_schemes()

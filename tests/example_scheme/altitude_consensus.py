@@ -26,7 +26,7 @@ class Gains(NamedTuple):
 
 
 class State(NamedTuple):
-    z_ref: Annotated[float, Q("z_ref", "m", "altitude reference")]
+    z_r: Annotated[float, Q("z_r", "m", "altitude reference")]
     theta_0: Annotated[float, Q("theta_0", "rad", "pitch in level flight")]
     elevator_0: Annotated[float, Q("elevator_0", "rad", "elevator in trim")]
     thrust_0: Annotated[float, Q("thrust_0", "N", "thrust in trim")]
@@ -39,7 +39,7 @@ class Output(NamedTuple):
     S2: Annotated[float, Q("S2", "m/s", "speed tracking error")]
 
 
-SHARED = {"follower": (Q("z_ref", "m", "altitude reference"),), "leader": (Q("z", "m", "altitude"),)}
+SHARED = {"follower": (Q("z_r", "m", "altitude reference"),), "leader": (Q("z", "m", "altitude"),)}
 GRAPH = Assumption.LEADERS_REACH_ALL
 COMMANDS = ("thrust", "elevator")
 SWITCHES = {"fault_tolerance": {"k_I": 0.0}}
@@ -54,22 +54,22 @@ def start(own, heard, reference, model, gains):
 def step(s, own, heard, reference, model, gains, dt):
     pull = 0.0
     for j in range(heard.weight.shape[0]):
-        pull += heard.valid[j] * heard.weight[j] * (heard.values[j, 0] - s.z_ref)
+        pull += heard.valid[j] * heard.weight[j] * (heard.values[j, 0] - s.z_r)
     rate = clip(gains.k_c * pull, -gains.climb, gains.climb)
-    S1, S2 = own.z - s.z_ref, own.V - reference.V
+    S1, S2 = own.z - s.z_r, own.V - reference.V
     gamma = clip((rate - gains.k_z * S1) / own.V, -0.15, 0.15)
     error = own.q - gains.k_theta * (s.theta_0 + gamma - own.theta)
     elevator = clip(s.elevator_0 + gains.k_q * error, model.elevator_min, model.elevator_max)
     thrust = clip(s.thrust_0 - gains.k_V * S2, model.thrust_min, model.thrust_max)
     h = gains.k_I * dt
     theta_0 = s.theta_0 - h * clip(0.1 * S1 / own.V, -0.01, 0.01)
-    trim = State(s.z_ref + rate * dt, theta_0, s.elevator_0 + h * error, s.thrust_0 - h * 10.0 * clip(S2, -1.0, 1.0))
+    trim = State(s.z_r + rate * dt, theta_0, s.elevator_0 + h * error, s.thrust_0 - h * 10.0 * clip(S2, -1.0, 1.0))
     return trim, Output(thrust, elevator, S1, S2)
 
 
 @compiled
 def share(state, own, reference, output, gains):
-    return (state.z_ref,)
+    return (state.z_r,)
 
 
 def check(gains, flight):
