@@ -28,4 +28,4 @@ def claims_in_flight(scenario: Scenario) -> tuple[Flight, list[Result]]:
     """Fly a scenario in memory and hold the claims of its case against the flight."""
     mission = resolve(scenario)
     flight = fly(mission)
-    return flight, evaluate(flight, mission.claims, mission.case, mission.graph)
+    return flight, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration)

@@ -145,15 +145,18 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
     return problems
 
 
-def evaluate(signals: Signals, claims: Iterable[Claim], case: str, graph: Graph) -> list[Result]:
-    """Hold all claims of ``case`` against a recording.
+def evaluate(
+    signals: Signals, claims: Iterable[Claim], case: str, graph: Graph, duration: float = math.inf
+) -> list[Result]:
+    """Hold all claims of ``case`` against a recording of a flight of ``duration`` seconds.
 
-    A window is covered if the recording of any UAV reaches its end; a claim about a UAV lost before then fails.
+    A window is covered if the recording of any UAV reaches its end; a claim about a UAV lost before then fails, unless
+    its metric tells of losses.
     """
     end = max(
         (float(signals.column("t", uav)[-1]) for uav in signals.uavs if len(signals.column("t", uav))), default=-1.0
     )
-    return [_result(signals, claim, case, graph, end) for claim in claims if case in claim.expected]
+    return [_result(signals, claim, case, graph, end, duration) for claim in claims if case in claim.expected]
 
 
 def failed(results: Iterable[Result]) -> list[Result]:
@@ -161,7 +164,7 @@ def failed(results: Iterable[Result]) -> list[Result]:
     return [result for result in results if result.ok is False]
 
 
-def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float) -> Result:
+def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float, duration: float) -> Result:
     uavs = uavs_of(claim, graph)
     expected = claim.expected[case]
     tolerance = tolerance_of(by_case(claim.tolerance, case))
@@ -169,14 +172,14 @@ def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float)
     def result(value: float | list[float] | None, ok: bool | None, remark: str = "") -> Result:
         return Result(claim, uavs, value, expected, tolerance.text, ok, remark)
 
-    if claim.window[1] > end + 1e-6:
-        return result(None, None, "not flown")
     metric = METRICS[claim.metric]
+    if claim.window[1] > (duration if metric.survives_loss else end) + 1e-6:
+        return result(None, None, "not flown")
     threshold = float(by_case(claim.threshold, case) or 0.0)
     values = []
     for uav in uavs:
         t = signals.column("t", uav)
-        if len(t) == 0 or t[-1] < claim.window[1] - 1e-6:
+        if len(t) == 0 or (t[-1] < claim.window[1] - 1e-6 and not metric.survives_loss):
             return result(None, False, f"UAV {uav} was lost")
         parts = claim.within or [claim.window]
         rows = np.concatenate([np.arange(len(t))[window_of(t, part)] for part in parts])

@@ -267,6 +267,8 @@ class Metric:
     meaning: str
     threshold: bool = False
     """Whether it needs one."""
+    survives_loss: bool = False
+    """Whether it says something of a UAV that is lost within the window."""
 
 
 def _time_until_below(t: Array, x: Array, threshold: float) -> float:
@@ -278,6 +280,11 @@ def _time_until_below(t: Array, x: Array, threshold: float) -> float:
 
 def _first_time(t: Array, x: Array, threshold: float) -> float:
     there = np.flatnonzero(np.abs(x) >= threshold)
+    return float(t[there[0]]) if len(there) else math.inf
+
+
+def _first_time_within(t: Array, x: Array, threshold: float) -> float:
+    there = np.flatnonzero(np.abs(x) <= threshold)
     return float(t[there[0]]) if len(there) else math.inf
 
 
@@ -330,5 +337,14 @@ METRICS = {
         _rms_change, "max", "root mean square of the change in so many seconds, threshold of them", True
     ),
     "first_time": Metric(_first_time, "max", "time at which abs(x) first reaches the threshold, s", True),
+    "first_time_within": Metric(
+        _first_time_within, "max", "time at which abs(x) is first within the threshold, s", True
+    ),
+    "mean_change": Metric(
+        lambda t, x, _: float(np.abs(np.diff(x)).mean()), "max", "mean absolute change from row to row"
+    ),
+    "last_time": Metric(
+        lambda t, x, _: float(t[-1]), "min", "time of the last row, also of a UAV that is lost, s", survives_loss=True
+    ),
     "duration_above": Metric(_duration_above, "max", "time for which x is at or above the threshold, s", True),
 }

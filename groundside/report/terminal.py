@@ -21,7 +21,7 @@ _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not 
 def claims_of(run: Run) -> list[Result]:
     """The claims of a run's scenario, held against what it recorded."""
     mission = run.mission
-    return evaluate(run, mission.claims, mission.case, mission.graph)
+    return evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
 def as_json(run: Run, results: list[Result]) -> str:

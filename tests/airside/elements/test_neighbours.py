@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftcc.airside.elements.neighbours import disagreement, extrapolated, motion_sums, weighted_average
+from ftcc.airside.elements.filters import critically_damped_step
+from ftcc.airside.elements.neighbours import (
+    disagreement,
+    error_sums,
+    extrapolated,
+    filtered_error_sums,
+    motion_sums,
+    weighted_average,
+)
 from ftcc.airside.scheme import Heard
 
 VALUES = np.array([[10.0, 1.0, 200.0, -2.0], [20.0, -0.5, 210.0, 0.0], [40.0, 2.0, 190.0, 4.0]])
@@ -68,3 +76,42 @@ def test_motion_sums_give_the_disagreement_at_any_later_time():
 def test_motion_sums_leave_out_who_was_never_heard():
     assert motion_sums(heard((0.0, 0.0, 0.0)), 2) == (0.0, 0.0, 0.0)
     assert motion_sums(heard((0.0, 1.0, 0.0)), 2) == pytest.approx((0.5, 105.0, 0.0))
+
+
+ERRORS = np.array([[0.1, 0.2, 0.3, 1.0, 2.0, 3.0], [-0.1, 0.0, 0.1, 0.0, 1.0, -1.0], [0.4, 0.4, 0.4, 5.0, 5.0, 5.0]])
+OWN = (0.05, -0.02, 0.01)
+
+
+def told(valid: tuple[float, ...] = (1.0, 1.0, 1.0), errors: np.ndarray = ERRORS) -> Heard:
+    return Heard(errors, AGE, np.array(valid), WEIGHT)
+
+
+@pytest.mark.parametrize(("oldest", "part"), [(0.0, [0, 1, 2]), (0.5, [0, 1]), (0.06, [0])])
+def test_synchronization_error_sums_of_those_who_are_not_silent(oldest, part):
+    """(7.12), (8.10)."""
+    weights, total, rates = error_sums(OWN, told(), oldest)
+    assert weights == pytest.approx(WEIGHT[part].sum())
+    assert total == pytest.approx(WEIGHT[part] @ (np.array(OWN) - ERRORS[part, :3]))
+    assert rates == pytest.approx(WEIGHT[part] @ ERRORS[part, 3:])
+
+
+def test_filtered_neighbours_start_at_their_first_error_and_follow_it():
+    memory = np.zeros((16, 7))
+    weights, total, rates = filtered_error_sums(OWN, told((0.0, 1.0, 0.0)), memory, 10.0, 0.0, 0.005)
+    assert (weights, rates) == (0.5, (0.0, 0.0, 0.0))
+    assert total == pytest.approx(0.5 * (np.array(OWN) - ERRORS[1, :3]))
+    moved = ERRORS + 0.2
+    _, total, rates = filtered_error_sums(OWN, told((0.0, 1.0, 0.0), moved), memory, 10.0, 0.0, 0.005)
+    after = [critically_damped_step(e, 0.0, e + 0.2, 10.0, 0.005) for e in ERRORS[1, :3]]
+    assert total == pytest.approx([0.5 * (own - value) for own, (value, _) in zip(OWN, after, strict=True)])
+    assert rates == pytest.approx([0.5 * rate for _, rate in after])
+
+
+def test_the_filter_of_a_dropped_neighbour_stands_still():
+    memory = np.zeros((16, 7))
+    filtered_error_sums(OWN, told(), memory, 10.0, 0.0, 0.005)
+    before = memory.copy()
+    weights, _, _ = filtered_error_sums(OWN, told(errors=ERRORS + 1.0), memory, 10.0, 0.5, 0.005)
+    assert weights == pytest.approx(0.9)
+    assert (memory[2] == before[2]).all()
+    assert (memory[:2] != before[:2]).any()

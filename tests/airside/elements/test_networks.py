@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ftcc.airside.elements.networks import (
+    adapt_neuron,
     adaptation_rate,
     adaptation_step,
     diagonal_energy,
@@ -65,3 +66,13 @@ def test_adaptation_in_steps_converges_to_its_rate_and_settles_at_the_same_place
 
 def test_leak_in_steps_never_overshoots():
     assert 0.0 < adaptation_step(1.0, 0.0, 2.2, 0.6, 15.0, 50.0, 10.0) < 1e-3
+
+
+def test_adapted_neurons_are_an_euler_step_of_the_weights_matrix():
+    """(8.27): W' = k (phi e^T - leak W); the output is that of the weights before the step."""
+    random = np.random.default_rng(3)
+    weights, activations, error = random.normal(size=(5, 3)), random.uniform(size=5), (0.3, -0.2, 0.1)
+    before = weights.copy()
+    added = [adapt_neuron(weights, n, activations[n], error, 2.0, 0.1, 0.01) for n in range(5)]
+    assert np.sum(added, axis=0) == pytest.approx(before.T @ activations)
+    assert weights == pytest.approx(before + 0.01 * 2.0 * (np.outer(activations, error) - 0.1 * before))

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ftcc.airside.elements.observers import (
+    discrete_disturbance_observer_step,
     disturbance_observer_rate,
     finite_time_observer,
     reference_system_step,
@@ -116,3 +117,15 @@ def test_finite_time_observer_finds_position_and_speed_of_an_accelerating_leader
             v, x - 0.25 * math.sin(2.0 * t), v - 0.5 * math.cos(2.0 * t), 0.5, 0.3, 0.2, 3.0, 0.4, 0.02
         )
         x, v = x + h * x_rate, v + h * v_rate
+
+
+def test_discrete_observer_has_both_poles_where_they_are_wanted():
+    """Error of a constant disturbance after n steps: (1 + n (1 - z)) z^n, z = exp(-w h), for any h."""
+    for w, h in ((40.0, 0.005), (40.0, 0.1)):
+        pole, rate, estimate, found = math.exp(-w * h), 0.7, 0.7, 0.0
+        for n in range(1, 30):
+            # The observer is told the rate at the tick; the next one has moved on by h (known + d).
+            estimate, found = discrete_disturbance_observer_step(estimate, found, rate, 0.3, w, h)
+            rate += h * (0.3 + 2.5)
+            expected = 2.5 * (1.0 - (1.0 + (n - 1) * (1.0 - pole)) * pole ** (n - 1))
+            assert found == pytest.approx(expected, abs=1e-9), (h, n)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ftcc.airside.elements.performance import EDGE, performance_transform, performance_tube
+from ftcc.airside.elements.performance import EDGE, bounded_transform, performance_transform, performance_tube
 
 
 def test_tube_of_chapter_3():
@@ -55,3 +55,21 @@ def test_outside_of_the_tube_everything_stays_finite_and_pushes_back(lower, uppe
         assert all(math.isfinite(value) for value in found)
         assert found[0] == math.copysign(EDGE * (upper if error > 0.0 else lower), error)
         assert found[1] * error > 0.0
+
+
+@pytest.mark.parametrize("share", [-0.8, 0.0, 0.5])
+def test_bounded_transform_is_the_other_one_within_its_guard(share):
+    width = 0.3
+    _, transformed, slope, _ = performance_transform(share * width, 0.0, width, 0.0, 1.1, 0.9)
+    assert bounded_transform(share * width, width, 1.1, 0.9, 0.95, 1.0) == pytest.approx((transformed, slope))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_beyond_its_guard_the_transform_goes_on_straight_or_stays(side):
+    width, edge = 0.3, 0.9
+    at = side * edge * 1.1 * width
+    transformed, slope = bounded_transform(at, width, 1.1, 1.1, edge, 1.0)
+    for beyond in (0.02, 0.5):
+        straight = bounded_transform(at + side * beyond, width, 1.1, 1.1, edge, 1.0)
+        assert straight == pytest.approx((transformed + side * beyond * slope, slope))
+        assert bounded_transform(at + side * beyond, width, 1.1, 1.1, edge, 0.0) == pytest.approx((transformed, slope))

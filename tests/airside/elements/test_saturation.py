@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ftcc.airside.elements.saturation import auxiliary_step, linear_auxiliary_rate, squared_auxiliary_step
+from ftcc.airside.elements.saturation import (
+    auxiliary_step,
+    linear_auxiliary_rate,
+    squared_auxiliary_step,
+    vector_auxiliary_step,
+)
 from tests.airside.elements.motion import integrated
 
 
@@ -80,3 +85,27 @@ def test_squared_auxiliary_decays_with_its_gain_when_saturation_ends():
     for _ in range(1000):
         state = squared_auxiliary_step(state, 1.1, 5.0, 0.0, 0.005, 0.001)
     assert state == pytest.approx(0.1 * np.exp(-1.1), rel=2e-3)
+
+
+@pytest.mark.parametrize("power", [0.3, -1.5])
+def test_vector_auxiliary_system_is_its_equation(power):
+    """(8.29), (8.41) well above the floor, decaying and growing."""
+    excess, start = np.array([0.5, -0.3, 0.2]), np.array([1.0, 0.5, -0.5])
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return -(2.0 + (power + 0.5 * excess @ excess) / max(y @ y, 1e-4)) * y + excess
+
+    t = np.linspace(0.0, 0.2, 3)
+    exact = integrated(rates, list(start), t)[:, -1]
+    state = tuple(start.tolist())
+    for _ in range(2000):
+        state = vector_auxiliary_step(state, 2.0, power, tuple(excess.tolist()), 1e-4, 1e-4)
+    assert state == pytest.approx(exact, rel=1e-3)
+
+
+def test_vector_auxiliary_system_rests_without_excess_and_is_stable_at_its_floor():
+    assert vector_auxiliary_step((0.0, 0.0, 0.0), 2.0, 0.0, (0.0, 0.0, 0.0), 1e-4, 0.01) == (0.0, 0.0, 0.0)
+    state = (1e-3, 0.0, 0.0)
+    for _ in range(50):
+        state = vector_auxiliary_step(state, 2.0, 10.0, (0.5, 0.0, 0.0), 1e-4, 0.01)
+        assert abs(state[0]) < 0.01
