@@ -30,9 +30,10 @@ def disturbance_observer_rate(gain, error, state, known, reference_rate):  # typ
 
 @compiled
 def discrete_disturbance_observer_step(estimate, disturbance, measured, explained, w, h):  # type: ignore[no-untyped-def]
-    """A sampled observer of d in x' = ``explained`` + d with both poles at exp(-w h) (not in the monograph).
+    """A sampled observer of d in x' = ``explained`` + d, with bandwidth ``w`` (rad/s; not in the monograph).
 
-    A constant d is found without error, at any rate w (rad/s). Steps itself.
+    The gains are 1 - z^2 and (1 - z)^2 with z = exp(-w h), close to which its two poles lie while w h is small. A
+    constant d is found without error. Steps itself.
 
     Returns
     -------

@@ -42,7 +42,7 @@ def true_rates(state, deflections, thrust):
 @pytest.mark.parametrize("state", STATES)
 def test_attitude_turns_as_the_true_aircraft_does(state):
     """X1' = F1 + G1 X2 of (7.1)."""
-    V, gamma, mu, alpha, beta, *rates = state
+    V, gamma, mu, alpha, beta, rates = *state[:5], state[5:]
     turning = applied(kinematics(alpha, beta), rates)
     drift = attitude_drift(V, gamma, (mu, alpha, beta), 25.0, V, MODEL)
     assert added(drift, turning) == pytest.approx(true_rates(state, (0.0, 0.0, 0.0), 25.0)[0], rel=1e-12)
@@ -51,7 +51,7 @@ def test_attitude_turns_as_the_true_aircraft_does(state):
 @pytest.mark.parametrize("state", STATES)
 def test_body_rates_change_as_those_of_the_true_aircraft(state):
     """X2' = F2 + G2 U of (7.2)."""
-    V, _, _, alpha, beta, *rates = state
+    V, alpha, beta, rates = state[0], state[3], state[4], state[5:]
     deflections = (0.02, -0.15, -0.3)
     drift, effect = body_rate_model(V, alpha, beta, rates, V, MODEL)
     assert added(drift, applied(effect, deflections)) == pytest.approx(

@@ -119,13 +119,17 @@ def test_finite_time_observer_finds_position_and_speed_of_an_accelerating_leader
         x, v = x + h * x_rate, v + h * v_rate
 
 
-def test_discrete_observer_has_both_poles_where_they_are_wanted():
-    """Error of a constant disturbance after n steps: (1 + n (1 - z)) z^n, z = exp(-w h), for any h."""
-    for w, h in ((40.0, 0.005), (40.0, 0.1)):
-        pole, rate, estimate, found = math.exp(-w * h), 0.7, 0.7, 0.0
-        for n in range(1, 30):
-            # The observer is told the rate at the tick; the next one has moved on by h (known + d).
-            estimate, found = discrete_disturbance_observer_step(estimate, found, rate, 0.3, w, h)
-            rate += h * (0.3 + 2.5)
-            expected = 2.5 * (1.0 - (1.0 + (n - 1) * (1.0 - pole)) * pole ** (n - 1))
-            assert found == pytest.approx(expected, abs=1e-9), (h, n)
+def test_discrete_observer_finds_a_constant_with_its_two_poles():
+    """Error of d after each step: that of the linear recursion; its poles are close to exp(-w h)."""
+    w, h = 40.0, 0.005
+    pole, rate, estimate, found = math.exp(-w * h), 0.7, 0.7, 0.0
+    recursion = np.array([[pole**2, h], [-((1.0 - pole) ** 2) / h, 1.0]])
+    assert abs(np.linalg.eigvals(recursion)) == pytest.approx(pole, rel=0.03)
+    error = np.array([0.0, 2.5])
+    for _ in range(200):
+        # The observer is told the rate at the tick; the next one has moved on by h (known + d).
+        estimate, found = discrete_disturbance_observer_step(estimate, found, rate, 0.3, w, h)
+        rate += h * (0.3 + 2.5)
+        error = recursion @ error
+        assert (rate - estimate, 2.5 - found) == pytest.approx(error, abs=1e-9)
+    assert found == pytest.approx(2.5, abs=1e-9)
