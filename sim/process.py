@@ -271,7 +271,8 @@ class Vehicles:
         )
         for i, pilot in enumerate(self.pilots):
             if self.alive[i]:
-                told = None if self.answers_last(i) else self.controls[i]
+                known = self.answers_last(i) and self.specs[i].delay == 0
+                told = None if known else self.controls[i]
                 pilot.send(*state_messages(self.now_us, self.messages[i], told))
 
     def record(self) -> None:
