@@ -89,6 +89,7 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
     latch(fleet, 0, fleet.command[0].copy())
+    fleet.waiting[0] = 0
     cycle.conditions(fleet, 0, 0.0, np.zeros(8 + fleet.disturbed.shape[1]))
     clearance(fleet.zones, 0.0, 0.0)
 
