@@ -88,8 +88,9 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     cycle.report_state(fleet, nobody, 0, 0, 0, true, seen, np.zeros((k, 13)), np.zeros((k, 4)))
     cycle.fly_period(fleet, nobody, 0, 1, 1, nobody)
     decode_command(np.zeros(4), fleet.travel[0], np.zeros(4))
+    waiting = fleet.waiting[0]
     latch(fleet, 0, fleet.command[0].copy())
-    fleet.waiting[0] = 0
+    fleet.waiting[0] = waiting
     cycle.conditions(fleet, 0, 0.0, np.zeros(8 + fleet.disturbed.shape[1]))
     clearance(fleet.zones, 0.0, 0.0)
 
