@@ -1,4 +1,4 @@
-"""Swarms of the longitudinal schemes as processes equal the simulation, bit for bit."""
+"""Swarms of the schemes as processes equal the simulation, bit for bit."""
 
 from __future__ import annotations
 
@@ -15,8 +15,13 @@ from tests.sitl.conftest import Flight, same_flight
 
 @pytest.mark.parametrize(
     ("scenario", "variants"),
-    [("prescribed_performance", ("loss_30",)), ("nearest_neighbour", ("lag", "loss_30"))],
-    ids=["chapter 3", "chapter 4"],
+    [
+        ("prescribed_performance", ("loss_30",)),
+        ("nearest_neighbour", ("lag", "loss_30")),
+        ("attitude_synchronization", ("loss_30", "delay_10")),
+        ("directed_attitude", ("loss_30", "delay_20")),
+    ],
+    ids=["chapter 3", "chapter 4", "chapter 7", "chapter 8"],
 )
 def test_processes_equal_the_simulation(
     scenario: str, variants: tuple[str, ...], fly: Callable[..., Flight], tmp_path: Path
