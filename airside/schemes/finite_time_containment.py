@@ -417,8 +417,11 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 f"{flight.leader_acceleration:.3f} m/s^2 (Lemma 6.6)",
             )
         )
-    rate = gains.beta4 * largest_degree(flight) / gains.kappa
-    problems += stable_in_steps({"beta4 / kappa": rate}, flight.period / gains.substeps)
+    steepness = largest_degree(flight) / gains.kappa
+    rates = {"beta4 / kappa": gains.beta4 * steepness, "beta2 / kappa": gains.beta2 * steepness}
+    problems += stable_in_steps(rates, flight.period / gains.substeps)
+    if gains.guards > 0.0:
+        problems += positive(gains, "cap1 cap2 cap4")
     if flight.period > (0.01 if gains.prediction > 0.0 else 0.008):
         problems.append(
             Problem(
