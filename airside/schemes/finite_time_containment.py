@@ -267,32 +267,18 @@ def _learned(estimate, error, energy, zeta, rate, leak, learns, cap, h):  # type
 
 
 @compiled
+def _estimated(place, speed, neighbours, ahead, g):  # type: ignore[no-untyped-def]
+    """Rates of the estimates of one axis (6.22)-(6.23), ``ahead`` seconds after the tick, see `motion_sums`."""
+    weights, places, speeds = neighbours
+    away = weights * place - (places + ahead * speeds)
+    return finite_time_observer(speed, away, weights * speed - speeds, g.beta1, g.beta2, g.beta3, g.beta4, g.a, g.kappa)
+
+
+@compiled
 def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elevator, g, h):  # type: ignore[no-untyped-def]
     """One internal step of length ``h``, ``ahead`` seconds after the tick, with the evaluation ``law`` held."""
-    weights, positions, rates = forward
-    x_rate, Vx_rate = finite_time_observer(
-        s.Vx_hat,
-        weights * s.x_hat - (positions + ahead * rates),
-        weights * s.Vx_hat - rates,
-        g.beta1,
-        g.beta2,
-        g.beta3,
-        g.beta4,
-        g.a,
-        g.kappa,
-    )
-    weights, altitudes, climbs = vertical
-    z_rate, Vz_rate = finite_time_observer(
-        s.Vz_hat,
-        weights * s.z_hat - (altitudes + ahead * climbs),
-        weights * s.Vz_hat - climbs,
-        g.beta1,
-        g.beta2,
-        g.beta3,
-        g.beta4,
-        g.a,
-        g.kappa,
-    )
+    x_rate, Vx_rate = _estimated(s.x_hat, s.Vx_hat, forward, ahead, g)
+    z_rate, Vz_rate = _estimated(s.z_hat, s.Vz_hat, vertical, ahead, g)
     cap1, cap2, cap4 = math.inf, math.inf, math.inf
     if g.guards > 0.0:
         cap1, cap2, cap4 = g.cap1, g.cap2, g.cap4
