@@ -24,7 +24,7 @@ from ftcc.groundside.schema_fire import PointMassSheet
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
 
 _HERE = Path(__file__).parent
-_VARIANT_KEYS = ("title", "forms")
+_VARIANT_KEYS = ("title", "forms", "claims_of")
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -156,6 +156,11 @@ def load(
     if duration is not None:
         merged["duration"] = duration
     plan = validate(Plan, merged, path)
+    inheriting = {name: block["claims_of"] for name, block in known_variants.items() if "claims_of" in block}
+    if inheriting and plan.flown is None:
+        for name, case in inheriting.items():
+            merged["claims"] = _inherited(path, merged.get("claims", []), name, case, known_forms, list(known_variants))
+        plan = validate(Plan, merged, path)
     name = path.stem
     if plan.flown is not None:
         name, ordered = plan.flown.name, tuple(plan.flown.variants)
@@ -197,6 +202,33 @@ def _variant(path: Path, name: str, block: dict[str, Any], form: str, forms: Seq
         raise ScenarioError(path, [f"variant = {name}: flies in form {', '.join(allowed)}, not in {form}"])
     changes = {key: value for key, value in block.items() if key not in (*_VARIANT_KEYS, *forms)}
     return _merged(changes, block.get(form, {}))
+
+
+def _inherited(
+    path: Path, claims: list[dict[str, Any]], variant: str, case: Any, forms: Sequence[str], variants: Sequence[str]
+) -> list[dict[str, Any]]:
+    """The claims, those of ``case`` also for ``case`` with ``variant`` where they say nothing of it."""
+    form, *names = str(case).split("+")
+    if form not in forms or names != [name for name in variants if name in names] or variant in names:
+        raise ScenarioError(
+            path,
+            [
+                f"variant.{variant}.claims_of = {case!r}: must be a form ({', '.join(forms)}), "
+                f"followed by other variants of the file, each after a +, in the file's order"
+            ],
+        )
+    own = "+".join((form, *(name for name in variants if name in (*names, variant))))
+    result = []
+    for claim in claims:
+        if case in claim["expected"] and own not in claim["expected"]:
+            by_case = {
+                key: value | {own: value[case]}
+                for key, value in claim.items()
+                if isinstance(value, dict) and case in value
+            }
+            claim = claim | by_case
+        result.append(claim)
+    return result
 
 
 def _check_cases(path: Path, plan: Plan, forms: Sequence[str], variants: Sequence[str]) -> None:

@@ -114,6 +114,7 @@ def test_a_vehicle_process_latches_at_tick_k_the_answer_to_state_k_minus_1(tmp_p
     station = Endpoint(STATION, 1, block.station)
     vehicles = Vehicles([vehicle(1)], setting, Gate(pipe))
     launcher.send(Go(Pace(0.0, 0, 1.0), Limit(None)))
+    vehicles.gate.wait_until_go()
     flying = threading.Thread(target=vehicles.fly)
     flying.start()
 

@@ -161,13 +161,25 @@ def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
     Raises
     ------
     ValueError
-        If a pitch angle is given that does not say what the angle of attack is.
+        If pitch and angle of attack are both given, or no angle of attack gives that pitch.
     """
-    gamma = start.get("gamma", 0.0)
+    gamma, mu, beta = (start.get(name, 0.0) for name in ("gamma", "mu", "beta"))
     alpha = start.get("alpha", steady["alpha"])
     if "theta" in start:
-        if "alpha" in start or start.get("mu", 0.0) != 0.0 or start.get("beta", 0.0) != 0.0:
-            raise ValueError("theta goes with level wings and without alpha; give alpha instead")
-        alpha = start["theta"] - gamma
+        if "alpha" in start:
+            raise ValueError("theta and alpha are both given; the one follows from the other")
+        alpha = _alpha_of(start["theta"], gamma, mu, beta)
     free = {name: start.get(name, 0.0) for name in State._fields if name not in ("V", "z", "gamma", "alpha")}
     return State(V=start["V"], z=start["z"], gamma=gamma, alpha=alpha, **free)
+
+
+def _alpha_of(theta: float, gamma: float, mu: float, beta: float) -> float:
+    """Angle of attack of an aircraft with that pitch: the inverse of `complete`."""
+    if mu == beta == 0.0:
+        return theta - gamma
+    level = math.sin(gamma) * math.cos(beta) + math.cos(gamma) * math.sin(beta) * math.sin(mu)
+    upright = math.cos(gamma) * math.cos(mu)
+    most = math.hypot(level, upright)
+    if abs(math.sin(theta)) > most:
+        raise ValueError(f"theta = {theta:g}: no angle of attack gives that pitch in a bank of {mu:g}")
+    return math.asin(math.sin(theta) / most) - math.atan2(level, upright)

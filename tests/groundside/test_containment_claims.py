@@ -74,8 +74,9 @@ def test_every_claim_of_every_case_holds(case: str, results_of: Callable[[str], 
 
 
 def claimed(source: str) -> list[tuple[str, ...]]:
-    """The cases of each claim with that source."""
-    return [tuple(claim.expected) for claim in CLAIMS if claim.source == source]
+    """The cases of each claim with that source; another aircraft is in no table."""
+    cases = [claim.expected for claim in CLAIMS if claim.source == source]
+    return [tuple(case for case in row if "sixdof" not in case) for row in cases]
 
 
 @pytest.mark.parametrize("row", TABLE_7_1)

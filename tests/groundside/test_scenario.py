@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 from ftcc.groundside.mission import resolve
 from ftcc.groundside.scenario import ScenarioError, load, shipped
+from ftcc.sim.airframe import Airframe
 
 Document = dict[str, Any]
 Edited = Callable[..., Path]
@@ -102,6 +104,32 @@ def test_each_uav_flies_with_the_common_gains_but_for_its_own() -> None:
         for common, spec in zip(plain.autopilots, own.autopilots, strict=True)
     }
     assert {uav: gains for uav, gains in changed.items() if gains} == {3: {"k11": 3.5, "k12": 4.0}, 5: {"k11": 6.0}}
+
+
+def test_a_variant_flies_another_plant_and_keeps_the_claims_of_its_case() -> None:
+    plane, six = resolve(load("containment")), resolve(load("containment", variants=["sixdof"]))
+    assert (plane.plant, six.plant) == ("longitudinal", "attitude")
+    assert [(c.name, c.expected["flight+sixdof"], c.tolerance) for c in six.claims] == [
+        (c.name, c.expected["flight"], c.tolerance) for c in plane.claims
+    ]
+    assert [spec.course for spec in six.autopilots] == [0.0] * 6 + [None] * 2
+    assert {spec.course for spec in plane.autopilots} == {None}
+
+
+def test_the_true_aircraft_differs_from_the_one_that_laws_know() -> None:
+    settings = ["plant.coefficients={all=1.2, CLde=1.0}", "plant.rate_limits.elevator=4.0"]
+    mission = resolve(load("containment", variants=["sixdof"], settings=settings))
+    true = Airframe(*mission.vehicles[0].airframe)
+    known = mission.autopilots[0].model
+    assert true.CLa == pytest.approx(1.2 * known.CLa)
+    assert true.CLde == known.CLde
+    assert mission.vehicles[0].rate == (math.inf, 4.0, math.inf, math.inf)
+    assert mission.vehicles[0].command == pytest.approx((0.0, -0.150914, 0.0, 23.310), abs=1e-3)
+
+
+def test_a_vehicle_may_hold_its_speed_itself() -> None:
+    settings = ["plant.autothrottle={airspeed=24.0, gain=10.0, thrust=20.0}"]
+    assert resolve(load("containment", settings=settings)).vehicles[0].autothrottle == (10.0, 24.0, 20.0)
 
 
 def test_a_switch_that_is_off_is_off_for_every_uav() -> None:
@@ -208,6 +236,15 @@ def test_malformed_toml_is_reported_with_its_line(tmp_path: Path) -> None:
         ({"settings": ["faults.0.actuator='flap'"]}, ["faults.0.actuator = 'flap'", "'thrust', 'elevator'"]),
         ({"settings": ["faults.0.uav=7"]}, ["faults.0.uav = 7", "followers are 1, 2, 3"]),
         ({"settings": ["plant.limits.aileron=[-0.5, 0.5]"]}, ["has no aileron", "thrust, elevator"]),
+        ({"settings": ["plant.rate_limits.rudder=1.0"]}, ["has no rudder", "thrust, elevator"]),
+        ({"settings": ["plant.model='glider'"]}, ["plant.model = 'glider'", "attitude, longitudinal"]),
+        ({"settings": ["plant.coefficients={CLx=1.2}"]}, ["plant.coefficients: CLx", "CLa", "and all"]),
+        ({"settings": ["start.mu=0.1"]}, ["start.mu: the plant has no such state", "theta"]),
+        ({"settings": ["noise.factor=1", "noise.alpha=0.1"]}, ["noise.alpha: follows from the other channels"]),
+        (
+            {"variants": ["sixdof"], "settings": ["start.alpha=0.1"]},
+            ["start of UAV 1", "theta and alpha are both given"],
+        ),
         ({"settings": ["plant.limits.elevator=[0.7, -0.7]"]}, ["lower limit must be below"]),
         ({"settings": ["start.z='high'"]}, ["start.z = 'high'", "valid number", "m, altitude"]),
         ({"settings": ["start.uav.9={z=1000}"]}, ["start.uav", "UAV 9 is no follower"]),
@@ -317,6 +354,10 @@ def _claim_for_no_case(document: Document) -> None:
     document["claims"][0]["expected"] = {"flihgt": 7.2}
 
 
+def _claims_of_no_case(document: Document) -> None:
+    document["variant"]["sixdof"]["claims_of"] = "flight+sixdof"
+
+
 def _form_is_no_table(document: Document) -> None:
     document["form"] = "flight"
 
@@ -351,6 +392,7 @@ def _unheard_trigger(document: Document) -> None:
         (_no_tolerance, ["claims.0", "'about right' is no tolerance", "15 %"]),
         (_no_threshold, ["claims.0", "needs a threshold"]),
         (_claim_for_no_case, ["claims.0.expected", "'flihgt'", "flight"]),
+        (_claims_of_no_case, ["variant.sixdof.claims_of = 'flight+sixdof'", "other variants"]),
         (_form_is_no_table, ["form = 'flight'", "[form.NAME]"]),
         (_unheard_trigger, ["leaders.7.commands", "no edge 8 -> 7"]),
     ],

@@ -303,9 +303,16 @@ def test_a_start_says_its_attitude_by_pitch_or_by_angle_of_attack():
     steady = {"alpha": 0.03}
     assert initial({"V": 30.0, "z": 1000.0}, steady).alpha == 0.03
     assert initial({"V": 30.0, "z": 1000.0, "gamma": 0.1, "theta": 0.15}, steady).alpha == pytest.approx(0.05)
-    for also in ({"alpha": 0.03}, {"mu": 0.1}, {"beta": 0.1}):
-        with pytest.raises(ValueError, match="give alpha instead"):
-            initial({"V": 30.0, "z": 1000.0, "theta": 0.1} | also, steady)
+    for also in ({"mu": 0.5}, {"beta": 0.2}, {"mu": -0.4, "beta": 0.1, "gamma": 0.2}):
+        banked = initial({"V": 30.0, "z": 1000.0, "theta": 0.1} | also, steady)
+        out = np.zeros(len(TRUTH))
+        truth(build([aircraft(initial=banked)]), 0, 0.0, out)
+        assert out[TRUTH.index("theta")] == pytest.approx(0.1, abs=1e-12)
+        assert abs(banked.alpha) < 0.3
+    with pytest.raises(ValueError, match="both given"):
+        initial({"V": 30.0, "z": 1000.0, "theta": 0.1, "alpha": 0.03}, steady)
+    with pytest.raises(ValueError, match=r"no angle of attack gives that pitch in a bank of 1.2"):
+        initial({"V": 30.0, "z": 1000.0, "theta": 0.5, "mu": 1.2}, steady)
 
 
 def test_factors_of_coefficients_by_name():

@@ -84,15 +84,18 @@ def test_who_watches_changes_nothing(
     assert same_flight(flight.folder, simulated())
 
 
-@pytest.mark.parametrize("pack", ["3", "auto"])
+@pytest.mark.parametrize(
+    ("pack", "variant"), [("3", "loss30"), ("auto", "loss30"), ("auto", "sixdof")], ids=["3", "auto", "sixdof"]
+)
 def test_packed_vehicles_equal_the_simulation(
-    fly: Callable[..., Flight], simulated: Callable[..., Path], pack: str
+    fly: Callable[..., Flight], simulated: Callable[..., Path], pack: str, variant: str
 ) -> None:
+    """Also those in six degrees of freedom, whose autopilots command all four actuators."""
     flight = fly(
-        "containment", "--variant", "loss30", "--speed", "max", "--duration", DURATION, "--seed", "1", "--pack", pack
+        "containment", "--variant", variant, "--speed", "max", "--duration", DURATION, "--seed", "1", "--pack", pack
     )
     assert flight.wait() == 0, flight.output
-    assert same_flight(flight.folder, simulated(("loss30",)))
+    assert same_flight(flight.folder, simulated((variant,)))
 
 
 def test_another_seed_is_another_flight_only_where_chance_plays(simulated: Callable[..., Path]) -> None:
