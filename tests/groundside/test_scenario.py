@@ -355,7 +355,7 @@ def _claim_for_no_case(document: Document) -> None:
 
 
 def _claims_of_no_case(document: Document) -> None:
-    document["variant"]["sixdof"]["claims_of"] = "flight+sixdof"
+    document["variant"] = {"again": {"claims_of": "flight+again"}}
 
 
 def _form_is_no_table(document: Document) -> None:
@@ -392,7 +392,7 @@ def _unheard_trigger(document: Document) -> None:
         (_no_tolerance, ["claims.0", "'about right' is no tolerance", "15 %"]),
         (_no_threshold, ["claims.0", "needs a threshold"]),
         (_claim_for_no_case, ["claims.0.expected", "'flihgt'", "flight"]),
-        (_claims_of_no_case, ["variant.sixdof.claims_of = 'flight+sixdof'", "other variants"]),
+        (_claims_of_no_case, ["variant.again.claims_of = 'flight+again'", "other variants"]),
         (_form_is_no_table, ["form = 'flight'", "[form.NAME]"]),
         (_unheard_trigger, ["leaders.7.commands", "no edge 8 -> 7"]),
     ],
