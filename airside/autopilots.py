@@ -37,7 +37,8 @@ from ftcc.airside.references.profiles import (
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, OwnReference
-from ftcc.link.actuators import ACTUATORS, SLOT, decode_command
+from ftcc.link.actuators import ACTUATORS, SLOT, decode_command, encode_command
+from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
 from ftcc.link.happenings import Happenings, drained, new_happenings, note
@@ -46,6 +47,7 @@ from ftcc.link.timing import Timing
 
 __all__ = [
     "Autopilots",
+    "aim",
     "build",
     "lead",
     "placeholder",
@@ -95,6 +97,8 @@ class Autopilots(NamedTuple):
     """(k, n): the scheme's ``SIGNALS``; nan for a leader."""
     travel: NDArray[np.float64]
     """(k, 4): full deflection of the actuators."""
+    code: NDArray[np.float64]
+    """(k, 3): see `AttitudeCode`."""
     offset: NDArray[np.float64]
     """(k,): lateral position, m."""
     profile: NDArray[np.float64]
@@ -244,6 +248,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             shared=np.zeros((k, values)),
             signals=signals,
             travel=np.array([spec.travel for spec in specs], np.float64),
+            code=np.array([spec.attitude_code for spec in specs], np.float64),
             offset=np.array([spec.offset for spec in specs], np.float64),
             profile=parameters,
             profile_commands=commands,
@@ -268,6 +273,16 @@ def sense(autopilots, i, message, reported, now_us):
     """
     decode_command(reported, autopilots.travel[i], reported)
     decode_state(message, now_us / 1e6, reported, autopilots.own[i])
+
+
+@compiled
+def aim(autopilots, i, target, controls):
+    """The command of UAV ``i`` as an attitude target (5,), and what the vehicle reads of it, in fractions of travel."""
+    own = autopilots.own[i]
+    V, gamma, chi = own[4], own[5], own[6]
+    encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], target)
+    decode_target(target, V, gamma, chi, autopilots.travel[i], autopilots.code[i], controls)
+    encode_command(controls, autopilots.travel[i], controls)
 
 
 @compiled

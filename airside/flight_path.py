@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ftcc.link.attitude_target import path_of
 from ftcc.link.compiled import compiled
 
 __all__ = ["Own", "decode_state"]
@@ -63,10 +64,7 @@ def decode_state(message, t, command, own):
     """
     q0, q1, q2, q3 = message[0], message[1], message[2], message[3]
     vx, vy, vz = message[10], message[11], message[12]
-    ground = math.sqrt(vx * vx + vy * vy)
-    speed = math.sqrt(ground * ground + vz * vz)
-    gamma = math.atan2(-vz, ground)
-    chi = math.atan2(vy, vx)
+    speed, gamma, chi = path_of(vx, vy, vz)
     # Columns of the rotation body -> NED.
     r11 = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3
     r21 = 2.0 * (q1 * q2 + q0 * q3)

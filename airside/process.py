@@ -15,18 +15,20 @@ from types import ModuleType
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, build, sense_all, tick_of, told
+from ftcc.airside.autopilots import Autopilots, aim, build, sense_all, tick_of, told
 from ftcc.airside.ground import GroundLink, Seat
 from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.attitude_target import TARGET
 from ftcc.link.channel import LINK_REPORT, Inbox, admit, report_link
 from ftcc.link.gate import Ended, Gate, Ready, Said
 from ftcc.link.mavlink import (
     AUTOPILOT,
     LOOPBACK,
     Endpoint,
+    attitude_message,
     command_message,
     ending_message,
     ends,
@@ -73,6 +75,7 @@ def load_compiled(autopilots: Autopilots, inbox: Inbox, events: LinkEvents, law:
     sense_all(autopilots, nobody, state, controls, 0)
     law.hear_and_control(autopilots, inbox, nobody, controls, nobody, 0, 1)
     set_links(events, inbox, -1)
+    aim(autopilots, 0, np.zeros(len(TARGET)), np.zeros(4))
     admit(inbox, 0, 0, -1, 0, True, autopilots.shared[0], 0, 0, 0)
     report_link(inbox, 0, 0, np.zeros(len(LINK_REPORT)))
 
@@ -98,6 +101,7 @@ class Crew:
         self.messages = np.zeros((k, 13))
         self.reported = np.zeros((k, 4))
         self.controls = np.zeros((k, 4))
+        self.target = np.zeros(len(TARGET))
         self.ok = np.ones(k, np.int64)
         self.states: list[collections.deque[tuple[int, np.ndarray, np.ndarray | None]]] = [
             collections.deque() for _ in specs
@@ -278,6 +282,9 @@ class Crew:
                 continue
             if self.specs[i].role == "leader":
                 self.vehicles[i].send(target_message(self.specs[i].uav, self.autopilots.target[i]))
+            elif self.specs[i].attitude_code.loading > 0.0:
+                aim(self.autopilots, i, self.target, self.controls[i])
+                self.vehicles[i].send(attitude_message(self.now_us(tick), self.specs[i].uav, self.target))
             else:
                 self.vehicles[i].send(command_message(self.now_us(tick), self.controls[i]))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import Flight
+from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
 
 __all__ = ["AutopilotSpec", "LinkEvent", "Neighbour", "OwnReference"]
@@ -72,6 +73,8 @@ class AutopilotSpec:
     """Lateral position, m."""
     course: float | None = None
     """Course that `lateral_hold` keeps for a law that commands no aileron and rudder, rad; None: there is none."""
+    attitude_code: AttitudeCode = UNCODED
+    """Whether and how commands travel as attitude targets."""
     hearers: tuple[int, ...] = field(default=())
     """Ids of those who hear this UAV."""
     tolerant_gains: tuple[float, ...] = ()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ftcc.airside.autopilots import lead, sense
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import as_sent, decode_command, encode_command
+from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import admit, hear, report_link
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.sim.navigation import navigate
@@ -94,6 +95,8 @@ class Scratch(NamedTuple):
     """(13,)."""
     controls: NDArray[np.float64]
     """(4,)."""
+    target: NDArray[np.float64]
+    """(5,): see ``link.attitude_target.TARGET``."""
 
 
 @compiled
@@ -145,12 +148,18 @@ def _settle(ether, autopilots, inbox, lost, now, dt):
 
 
 @compiled
-def _latch(fleet, autopilots, i, wire, buffer):
+def _latch(fleet, autopilots, i, wire, buffer, target):
     """Bring the last command into force."""
     if autopilots.leader[i] == 1:
         copy(autopilots.target[i], fleet.target[i])
         if wire:
             as_sent(fleet.target[i, 1:])
+    elif wire and fleet.code[i, 0] > 0.0:
+        own = autopilots.own[i]
+        V, gamma, chi = own[4], own[5], own[6]
+        encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], target)
+        decode_target(target, V, gamma, chi, fleet.travel[i], fleet.code[i], buffer)
+        latch(fleet, i, buffer)
     elif wire:
         encode_command(autopilots.command[i], autopilots.travel[i], buffer)
         decode_command(buffer, fleet.travel[i], buffer)
@@ -196,7 +205,7 @@ def fly(
                 continue
             if wire:
                 if n > 0:
-                    _latch(fleet, autopilots, i, wire, buffer)
+                    _latch(fleet, autopilots, i, wire, buffer, scratch.target)
                 _actuate(fleet, i, now / 1e6)
             _truth(fleet, i, now / 1e6, true[i])
             watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[i, X], true[i, Z])
@@ -244,7 +253,7 @@ def fly(
             if recording.lost[i] > 0 and not diverged_now:
                 continue
             if not wire:
-                _latch(fleet, autopilots, i, wire, buffer)
+                _latch(fleet, autopilots, i, wire, buffer, scratch.target)
                 _actuate(fleet, i, now / 1e6)
             if n % every == 0:
                 row = n // every

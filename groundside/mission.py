@@ -40,6 +40,7 @@ from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, RateLimits
 from ftcc.groundside.schema_fire import PointMassSheet
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
+from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
@@ -113,10 +114,11 @@ def resolve(scenario: Scenario) -> Mission:
     obstacles = tuple(Obstacle(*fields.x, fields.top) for fields in plan.obstacles)
     profiles = profiles_of(plan, graph, findings)
     findings.stop_if_refused()
-    vehicles = [_aircraft(plan, uav, plant, true, limits, findings) for uav in graph.followers]
+    model = _nominal(plan, sheet, limits)
+    code = _code(model, plant)
+    vehicles = [_aircraft(plan, uav, plant, true, limits, code, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
     findings.stop_if_refused()
-    model = _nominal(plan, sheet, limits)
     if plan.fire is None:
         check_faults(plan, plant, vehicles, profiles, findings)
     else:
@@ -164,6 +166,7 @@ def resolve(scenario: Scenario) -> Mission:
             profile=profiles.get(vehicle.uav),
             offset=vehicle.offset,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
+            attitude_code=vehicle.attitude_code,
             hearers=tuple(graph.receivers(vehicle.uav)),
         )
         for vehicle in vehicles
@@ -235,6 +238,7 @@ def _aircraft(
     plant: ModuleType,
     airframe: tuple[float, ...],
     limits: tuple[tuple[float, float], ...],
+    code: AttitudeCode,
     findings: Findings,
 ) -> VehicleSpec:
     own = plan.start.uav.get(uav)
@@ -271,6 +275,7 @@ def _aircraft(
         delay=plan.plant.delay,
         holds_first=isinstance(plan.plant.initial_actuators, dict),
         gust=_gust(plan, channels, findings),
+        attitude_code=code,
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=actuator_faults(plan, uav),
         navigation_faults=navigation_faults(plan, uav),
@@ -286,6 +291,13 @@ def _aircraft(
         offset=start.get("y", 0.0),
         autothrottle=NO_AUTOTHROTTLE if throttle is None else Autothrottle(**throttle.model_dump()),
     )
+
+
+def _code(model: Model, plant: ModuleType) -> AttitudeCode:
+    """How commands travel as attitude targets, if the plant takes them so."""
+    if not getattr(plant, "BY_ATTITUDE", False):
+        return UNCODED
+    return AttitudeCode(2.0 * model.m * model.g / (model.rho * model.S), model.CL0, model.CLa)
 
 
 def _mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:

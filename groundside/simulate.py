@@ -19,6 +19,7 @@ from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run, write_table
 from ftcc.link.actuators import ACTUATORS, in_slots
+from ftcc.link.attitude_target import TARGET
 from ftcc.link.channel import LINK_REPORT
 from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.happenings import drained
@@ -169,7 +170,9 @@ def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
         lost=np.zeros(k, np.int64),
         lost_us=np.zeros(k, np.int64),
     )
-    scratch = loop.Scratch(np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(ACTUATORS)))
+    scratch = loop.Scratch(
+        np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(ACTUATORS)), np.zeros(len(TARGET))
+    )
     events = link_events(mission.autopilots)
     return build_vehicles(mission.vehicles), autopilots, inbox, events, ether, recording, scratch
 

@@ -19,11 +19,13 @@ __all__ = [
     "STATION",
     "Endpoint",
     "as_typed",
+    "attitude_message",
     "command_message",
     "dialect",
     "ending_message",
     "ends",
     "float_array",
+    "read_attitude",
     "read_command",
     "read_state",
     "read_target",
@@ -45,6 +47,11 @@ _LARGEST_DATAGRAM = 4096
 _LARGEST = 3.4e38
 """What float32 can hold."""
 _UNUSED_CONTROLS = (0.0,) * 12
+_NO_RATES = (
+    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+)
 _POSITION_AND_VELOCITY = (
     dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
     | dialect.POSITION_TARGET_TYPEMASK_AY_IGNORE
@@ -221,6 +228,22 @@ def target_message(system: int, target: NDArray[np.float64]) -> Any:
         0.0,
         0.0,
     )
+
+
+def attitude_message(stamp_us: int, system: int, target: NDArray[np.float64]) -> Any:
+    """An attitude target, see `attitude_target`, answering the state of that stamp."""
+    q1, q2, q3, q4, thrust = target.tolist()
+    return dialect.MAVLink_set_attitude_target_message(
+        stamp_us // 1000, system, SIMULATOR, _NO_RATES, (q1, q2, q3, q4), 0.0, 0.0, 0.0, thrust
+    )
+
+
+def read_attitude(message: Any, target: NDArray[np.float64]) -> int:
+    """The inverse of `attitude_message`: the stamp in us, or -1 for another message."""
+    if message.get_type() != "SET_ATTITUDE_TARGET":
+        return -1
+    target[:] = (*message.q, message.thrust)
+    return int(message.time_boot_ms) * 1000
 
 
 def read_target(message: Any, target: NDArray[np.float64]) -> int:

@@ -193,6 +193,8 @@ class Fleet(NamedTuple):
     """(k, 2): updates of a slow solution that are past."""
     disturbances: NDArray[np.float64]
     """(k, n, 4): see `Disturbance`; unused rows have time inf."""
+    code: NDArray[np.float64]
+    """(k, 3): see `AttitudeCode`."""
     gust_deviation: NDArray[np.float64]
     """(k,): see `Gust`."""
     gust_period_us: NDArray[np.int64]

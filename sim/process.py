@@ -7,6 +7,7 @@ waits for it.
 
 from __future__ import annotations
 
+import collections
 import functools
 import time
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from types import ModuleType
 import numpy as np
 
 from ftcc.link.actuators import decode_command, in_slots, unit_of
+from ftcc.link.attitude_target import TARGET, decode_target, path_of
 from ftcc.link.failures import Failure, failure_answer, read_failure
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
 from ftcc.link.happenings import drained
@@ -26,6 +28,7 @@ from ftcc.link.mavlink import (
     ending_message,
     ends,
     float_array,
+    read_attitude,
     read_command,
     read_target,
     state_messages,
@@ -40,6 +43,9 @@ from ftcc.sim.spec import VehicleSpec, build
 
 __all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
 
+
+_PATHS = 16
+"""States whose path a vehicle remembers, for commands that come late."""
 
 _CLEARANCE = Column("clearance", "m", "height above the obstacle below, or above z = 0 where there is none")
 
@@ -91,6 +97,8 @@ def load_compiled(fleet: Fleet, cycle: ModuleType) -> None:
     waiting = fleet.waiting[0]
     latch(fleet, 0, fleet.command[0].copy())
     fleet.waiting[0] = waiting
+    V, gamma, chi = path_of(1.0, 0.0, 0.0)
+    decode_target(np.zeros(len(TARGET)), V, gamma, chi, fleet.travel[0], fleet.code[0], np.zeros(4))
     cycle.conditions(fleet, 0, 0.0, np.zeros(8 + fleet.disturbed.shape[1]))
     clearance(fleet.zones, 0.0, 0.0)
 
@@ -115,6 +123,11 @@ class Vehicles:
         self.answered = np.full(k, -1, np.int64)
         self.received = np.zeros((k, 4))
         self.latched = np.zeros(4)
+        self.attitude = np.zeros(len(TARGET))
+        self.paths: list[collections.deque[tuple[int, tuple[float, float, float]]]] = [
+            collections.deque(maxlen=_PATHS) for _ in specs
+        ]
+        """Stamp (us) and path of the last states sent."""
         self.targets = np.zeros((k, 7))
         self.late = np.zeros(k, np.int64)
         self.conditions = np.zeros(len(conditions_of(specs[0].plant)))
@@ -218,6 +231,10 @@ class Vehicles:
                 continue
             if self.specs[i].kind == "reference_point":
                 stamp = read_target(message, self.targets[i])
+            elif self.specs[i].attitude_code.loading > 0.0:
+                stamp = read_attitude(message, self.attitude)
+                if stamp >= 0 and not self.understand(i, stamp):
+                    continue
             else:
                 stamp = read_command(message, self.received[i])
             if not self.alive[i]:
@@ -239,6 +256,15 @@ class Vehicles:
             result = dialect.MAV_RESULT_TEMPORARILY_REJECTED
         self.pilots[i].send_aside(failure_answer(self.specs[i].uav, result, at_us))
 
+    def understand(self, i: int, stamp_us: int) -> bool:
+        """Read vehicle ``i``'s attitude target by the path of the state that it answers; False if that is forgotten."""
+        for stamp, (V, gamma, chi) in self.paths[i]:
+            if stamp == stamp_us:
+                travel, code = self.fleet.travel[i], self.fleet.code[i]
+                decode_target(self.attitude, V, gamma, chi, travel, code, self.received[i])
+                return True
+        return False
+
     def latch(self) -> None:
         """Bring the newest commands into force; one that does not answer the last state is late."""
         if self.tick == 0:
@@ -251,7 +277,10 @@ class Vehicles:
                 if spec.kind == "reference_point":
                     self.fleet.target[i] = self.targets[i]
                 else:
-                    decode_command(self.received[i], self.fleet.travel[i], self.latched)
+                    if spec.attitude_code.loading > 0.0:
+                        self.latched[:] = self.received[i]
+                    else:
+                        decode_command(self.received[i], self.fleet.travel[i], self.latched)
                     latch(self.fleet, i, self.latched)
 
     def answers_last(self, i: int) -> bool:
@@ -275,6 +304,9 @@ class Vehicles:
             if self.alive[i]:
                 known = self.answers_last(i) and self.specs[i].delay == 0
                 told = None if known else self.controls[i]
+                if self.specs[i].attitude_code.loading > 0.0:
+                    vx, vy, vz = self.messages[i, 10:].tolist()
+                    self.paths[i].append((self.now_us, path_of(vx, vy, vz)))
                 pilot.send(*state_messages(self.now_us, self.messages[i], told))
 
     def record(self) -> None:

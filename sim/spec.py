@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
+from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.happenings import new_happenings
 from ftcc.sim.failures import SPARE, inject
 from ftcc.sim.navigation import NavigationFault
@@ -61,6 +62,8 @@ class VehicleSpec:
     holds_first: bool = False
     """Whether ``command`` stays in force for that delay; otherwise the first command received is in force at once."""
     gust: Gust = CALM
+    attitude_code: AttitudeCode = UNCODED
+    """Whether and how commands come as attitude targets."""
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
     navigation_faults: tuple[NavigationFault, ...] = ()
@@ -107,6 +110,7 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         speed=np.zeros((k, len(ACTUATORS))),
         delayed=np.repeat(command[:, None, :], max(spec.delay for spec in specs), axis=1),
         waiting=np.array([spec.holds_first for spec in specs], np.int64),
+        code=np.array([spec.attitude_code for spec in specs], np.float64),
         gust_deviation=np.array([spec.gust.deviation for spec in specs], np.float64),
         gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),

@@ -201,7 +201,9 @@ class Swarm:
             np.zeros(k, np.int64),
             np.zeros(k, np.int64),
         )
-        self._scratch = self.loop.Scratch(np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(4))
+        self._scratch = self.loop.Scratch(
+            np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(4), np.zeros(5)
+        )
 
     @property
     def scheme(self) -> Scheme:

@@ -38,6 +38,7 @@ from ftcc.sim.trim import trim
 
 __all__ = [
     "ACTUATORS",
+    "BY_ATTITUDE",
     "COMPLETED",
     "DISTURBANCES",
     "SERVES",
@@ -56,6 +57,8 @@ __all__ = [
 ]
 
 Parameters = Airframe
+BY_ATTITUDE = True
+"""Its commands travel as attitude targets."""
 START = ("V", "x", "y", "z", "gamma", "chi")
 
 _SURFACE_LAG = 20.0
