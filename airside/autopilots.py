@@ -72,7 +72,7 @@ class Autopilots(NamedTuple):
     reference_parameters: NDArray[np.float64]
     """(k, n): see `OwnReference`."""
     reference_commands: NDArray[np.float64]
-    """(k, m, c): see `OwnReference`; unused rows have time inf. The last row is free for a command from the ground."""
+    """(k, m, c): see `OwnReference`; unused rows have time inf. The last two are free for commands from the ground."""
     state: NDArray[np.float64]
     """(k, n): the scheme's ``State``."""
     output: NDArray[np.float64]
@@ -188,10 +188,10 @@ def placeholder(scheme: str) -> AutopilotSpec:
 
 
 def _commands_of(specs: Sequence[AutopilotSpec]) -> NDArray[np.float64]:
-    """The commands of the UAVs' own references as one table, with a free last row."""
+    """The commands of the UAVs' own references as one table, with two free last rows."""
     tables = [spec.reference.commands for spec in specs]
     width = max([1] + [len(row) for table in tables for row in table])
-    commands = np.full((len(specs), max(map(len, tables)) + 1, width), math.inf)
+    commands = np.full((len(specs), max(map(len, tables)) + 2, width), math.inf)
     for rows, table in zip(commands, tables, strict=True):
         for row, given in zip(rows, table, strict=False):
             row[:] = given

@@ -16,6 +16,7 @@ import numpy as np
 
 from ftcc.airside.ground.seat import Seat
 from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
 from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
@@ -66,7 +67,7 @@ class Parameters:
     def __init__(self, seat: Seat, rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> None:
         self._seat = seat
         seat.sizes.update({size.name: size.default for size in SIZES if size.name not in seat.sizes})
-        own = [*_system(seat), *_sizes(seat), *_channel(seat), *_rates(rate_of, set_rate), *_gains(seat)]
+        own = [*_system(seat), *_sizes(seat), *_channel(seat), *_fire(seat), *_rates(rate_of, set_rate), *_gains(seat)]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
 
@@ -174,6 +175,29 @@ def _channel(seat: Seat) -> Iterator[Parameter]:
 
     for name, (field, high, meaning) in _CHANNEL.items():
         yield one(name, field, high, meaning)
+
+
+def _fire(seat: Seat) -> Iterator[Parameter]:
+    """Where the fire is and where it drifts, from FTCC_AT on: to be told to all UAVs for the same time."""
+    if seat.scheme.plant != "position":
+        return
+    commands = seat.autopilots.reference_commands[seat.i]
+    limit = Fire(*seat.spec.reference.parameters).shift_speed
+
+    def one(name: str, field: str, most: float, meaning: str) -> Parameter:
+        def write(value: float) -> None:
+            at_us = seat.at_ms * 1000 or seat.next_us
+            if at_us < seat.next_us:
+                raise RefusedError(f"{name}: FTCC_AT {seat.at_ms} ms is past")
+            if not change_from_ground(commands, seat.now_us / 1e6, at_us / 1e6, field, value):
+                raise RefusedError(f"{name}: a change of the fire at another time is waiting")
+
+        return Parameter(name, lambda: float(getattr(newest(commands), field)), write, -most, most, meaning=meaning)
+
+    yield one("FIRE_NORTH", "north", 1e5, "centre of the fire at the time of its change, m north")
+    yield one("FIRE_EAST", "east", 1e5, "m east")
+    yield one("FIRE_DRIFT_N", "drift_north", 0.99 * limit, "its drift, m/s north")
+    yield one("FIRE_DRIFT_E", "drift_east", 0.99 * limit, "m/s east")
 
 
 def _rates(rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> Iterator[Parameter]:

@@ -21,7 +21,19 @@ from ftcc.airside.elements.filters import reference_shaper
 from ftcc.airside.scheme import Quantity
 from ftcc.link.compiled import compiled, fields
 
-__all__ = ["Command", "Fire", "Reference", "border", "centre", "moved", "refer", "stand", "start"]
+__all__ = [
+    "Command",
+    "Fire",
+    "Reference",
+    "border",
+    "centre",
+    "change_from_ground",
+    "moved",
+    "newest",
+    "refer",
+    "stand",
+    "start",
+]
 
 Q = Quantity
 
@@ -101,6 +113,28 @@ def moved(
     """The command after ``command``: from ``at`` on another centre (m), another drift (m/s), or both."""
     north, east = centre_at if centre_at is not None else centre(command, at)
     return Command(at, north, east, *(drift if drift is not None else command[3:]))
+
+
+def newest(commands: NDArray[np.float64]) -> Command:
+    """What the ground, or else the scenario, last said of the fire, be it in force yet or not."""
+    said = np.flatnonzero(np.isfinite(commands[:, 0]))
+    return Command(*commands[said[-1]].tolist())
+
+
+def change_from_ground(commands: NDArray[np.float64], now: float, at: float, field: str, value: float) -> bool:
+    """From ``at`` (s) on, one field of the fire's `Command` is ``value``, whatever the scenario still plans.
+
+    Changes for the same time belong together. Returns False where a change for another time is still waiting.
+    """
+    if commands[-1, 0] != at:
+        if now < commands[-1, 0] < math.inf:
+            return False
+        before = commands[in_force(commands, at)].copy()
+        if commands[-1, 0] < math.inf:
+            commands[-2] = commands[-1]
+        commands[-1] = moved(Command(*before.tolist()), at)
+    commands[-1, Command._fields.index(field)] = value
+    return True
 
 
 def border(fire: Fire, commands: Sequence[Command], t: float, points: int = 72) -> NDArray[np.float64]:

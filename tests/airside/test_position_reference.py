@@ -7,7 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from ftcc.airside.references.position import Command, Fire, Reference, border, moved, refer, start
+from ftcc.airside.references.position import (
+    Command,
+    Fire,
+    Reference,
+    border,
+    change_from_ground,
+    moved,
+    newest,
+    refer,
+    start,
+)
 
 FIRE = Fire(1.2, 0.8, 1800.0, 0.0327, 0.0, 0.5, 0.5, 100.0, 4.0, 0.2)
 """UAV 1 of the published scenario."""
@@ -77,3 +87,24 @@ def test_another_wind_leaves_the_fire_where_it_is():
     windier = moved(THERE, 50.0, drift=(0.6, 0.2))
     assert windier[1:] == pytest.approx((543.0 + 0.3 * 50.0, 4.0, 0.6, 0.2))
     assert border(FIRE, (THERE, windier), 50.0) == pytest.approx(border(FIRE, (THERE,), 50.0))
+
+
+def test_the_ground_moves_the_fire_at_one_time_and_again_later():
+    """Changes for one time belong together; the same rows as those of a scenario, hence the same flight."""
+    commands = np.full((3, 5), math.inf)
+    commands[0] = THERE
+    assert change_from_ground(commands, 5.0, 10.0, "north", 700.0)
+    assert change_from_ground(commands, 5.0, 10.0, "drift_east", -0.5)
+    first = Command(10.0, 700.0, 4.0, 0.3, -0.5)
+    assert newest(commands) == first
+    assert not change_from_ground(commands, 6.0, 12.0, "north", 0.0), "the first one is still waiting"
+    told = np.array(start(FIRE, (THERE,)))
+    planned = told.copy()
+    for k in range(1, 1501):
+        if k == 1000:
+            assert change_from_ground(commands, 20.0, 25.0, "east", 50.0)
+            assert newest(commands) == moved(first, 25.0, (first.north + 0.3 * 15.0, 50.0))
+        refer(np.array(FIRE), commands, told, k * 20_000, 20_000)
+        both = np.array((THERE, first, moved(first, 25.0, (704.5, 50.0))))
+        refer(np.array(FIRE), both, planned, k * 20_000, 20_000)
+    assert np.array_equal(told, planned)

@@ -20,8 +20,10 @@ from tests.sitl.conftest import Flight, same_flight
         ("nearest_neighbour", ("lag", "loss_30")),
         ("attitude_synchronization", ("loss_30", "delay_10")),
         ("directed_attitude", ("loss_30", "delay_20")),
+        ("fire_monitoring", ("loss30",)),
+        ("fire_monitoring_sixdof", ("loss30",)),
     ],
-    ids=["chapter 3", "chapter 4", "chapter 7", "chapter 8"],
+    ids=["chapter 3", "chapter 4", "chapter 7", "chapter 8", "chapter 9", "chapter 9 by attitude targets"],
 )
 def test_processes_equal_the_simulation(
     scenario: str, variants: tuple[str, ...], fly: Callable[..., Flight], tmp_path: Path
