@@ -133,8 +133,10 @@ def _sys_status(seat: Seat) -> Any:
     received = int(seat.inbox.edges[seat.i, : seat.inbox.degree[seat.i], 4].sum())
     share = round(1e4 * lost / max(1, lost + received))
     # No battery is modelled: unknown voltage and current, 100 % so that no client raises an alarm.
+    # There is no fence; one that does not count as healthy is announced as breached.
+    healthy = _SENSORS | _M.MAV_SYS_STATUS_GEOFENCE
     return _M.MAVLink_sys_status_message(
-        _SENSORS, _SENSORS, _SENSORS, 0, 65535, -1, 100, share, min(65535, lost), 0, 0, 0, 0
+        _SENSORS, _SENSORS, healthy, 0, 65535, -1, 100, share, min(65535, lost), 0, 0, 0, 0
     )
 
 

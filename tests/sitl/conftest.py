@@ -26,6 +26,7 @@ class Flight:
 
     def __init__(self, arguments: list[str], folder: Path, environment: dict[str, str]) -> None:
         self.folder = folder
+        self.environment = environment
         self._output = folder.with_suffix(".txt")
         self._output.parent.mkdir(parents=True, exist_ok=True)
         with self._output.open("w") as output:
