@@ -42,6 +42,7 @@ def airframe(
 ) -> None:
     """Show level trim and linear modes of an airframe, thrust and surfaces fixed."""
     from ftcc.groundside.scenario import load_airframe
+    from ftcc.groundside.schema import AirframeSheet
     from ftcc.sim.airframe import Airframe, scaled
     from ftcc.sim.modes import modes
     from ftcc.sim.trim import TrimError, trim
@@ -52,7 +53,9 @@ def airframe(
             fail(f"--airspeed {V:g}: must be a positive number of m/s")
     if len(speeds) > _COLUMNS_TO_CHOOSE:
         fail(f"--airspeed: {len(speeds)} of them; at most {_COLUMNS_TO_CHOOSE} fit side by side")
-    sheet = load_airframe(name, Path("--airframe"))
+    sheet = load_airframe(name, Path("NAME"))
+    if not isinstance(sheet, AirframeSheet):
+        fail(f"airframe = {name!r}: is a point mass, which has no attitude to trim and no modes")
     aircraft = Airframe(**{field: float(getattr(sheet, field)) for field in Airframe._fields})
     try:
         aircraft = scaled(aircraft, _factors(coefficient or []))

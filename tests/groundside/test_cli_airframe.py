@@ -41,6 +41,7 @@ def test_the_poles_are_drawn(tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["point_20kg"], "point_20kg': is a point mass"),
         (["--airspeed", "5"], "no level trim at 5 m/s"),
         (["--airspeed", "-3"], "must be a positive number"),
         (["--coefficient", "CLa"], "must be NAME=FACTOR"),
