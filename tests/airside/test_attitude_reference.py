@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
-from ftcc.airside.references.attitude import Command, Filter, Reference, refer
+from ftcc.airside.flight_path import Own
+from ftcc.airside.references.attitude import Command, Filter, Reference, attitude, command_from_ground, refer
+from ftcc.link.mavlink import dialect
 
 STEP_US = 500
 
@@ -67,3 +70,37 @@ def test_a_row_at_the_end_overrules_the_mission_once_its_time_has_come() -> None
     overruled = flown([*STEP, ground], 20.0)
     assert abs(overruled[-1, 0] + 0.1) < 2e-3
     assert Reference(*overruled[-1]).beta == 0.0
+
+
+IGNORE = dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+
+
+def asked(q: tuple[float, ...], mask: int = 0b111, gamma: float = 0.2, chi: float = -2.0) -> tuple[Command | None, str]:
+    """What a UAV on a path makes of a SET_ATTITUDE_TARGET."""
+    own = np.array(Own(**dict.fromkeys(Own._fields, 0.0) | {"V": 30.0, "gamma": gamma, "chi": chi}))
+    message = dialect.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(q), 0.0, 0.0, 0.0, 0.0)
+    return command_from_ground(message, own, 2_500_000)
+
+
+@pytest.mark.parametrize("wanted", [(0.0, 0.05, 0.0), (0.5, 0.1, -0.1), (-1.0, -0.1, 0.2)])
+def test_a_target_from_the_ground_is_taken_apart_along_the_present_path(wanted: tuple[float, float, float]) -> None:
+    row, why = asked(attitude(0.2, -2.0, *wanted))
+    assert why == ""
+    assert row == pytest.approx((2.5, *wanted))
+
+
+@pytest.mark.parametrize(
+    ("q", "mask", "because"),
+    [
+        (attitude(0.2, -2.0, 0.0, 0.35, 0.0), 0b111, "0, 20, 0 deg: outside the envelope"),
+        (attitude(0.2, -2.0, 1.2, 0.05, 0.0), 0b111, "69, 3, 0 deg: outside the envelope"),
+        ((0.9, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),
+        ((math.nan, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),
+        ((0.0, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),
+        ((1.0, 0.0, 0.0, 0.0), 0b111 | IGNORE, "without an attitude"),
+    ],
+)
+def test_targets_that_cannot_be_flown_are_refused(q: tuple[float, ...], mask: int, because: str) -> None:
+    row, why = asked(q, mask)
+    assert row is None
+    assert because in why

@@ -96,6 +96,9 @@ def test_the_same_holds_for_forward_positions(known: Known) -> None:
         ("first_time", 0.5, 0.09),
         ("time_until_below", 1.5, 0.0),
         ("duration_above", 0.5, 3.3),
+        ("first_time_within", 0.5, 0.0),
+        ("mean_change", None, 0.04),
+        ("last_time", None, 10.0),
     ],
 )
 def test_metrics_of_a_sine(known: Known, metric: str, threshold: float | None, value: float) -> None:
@@ -236,3 +239,30 @@ def test_expressions_compute(known: Known) -> None:
         evaluated("max(abs(-x) ** 2 / 4, 0.1) + 1", known, GRAPH, 2), np.maximum(known.column("x", 2) ** 2 / 4, 0.1) + 1
     )
     assert np.isinf(evaluated("1 / 0", known, GRAPH, 1)).all()
+
+
+def test_swarm_functions_look_at_all_followers_and_at_the_neighbours(known: Known) -> None:
+    """x of UAV 2 is twice that of UAV 1; each hears the other with weight 1, and leaders do not count."""
+    x = known.column("x", 1)
+    np.testing.assert_allclose(evaluated("total(x ** 2)", known, GRAPH, 2), 5.0 * x**2)
+    np.testing.assert_allclose(evaluated("largest(abs(x))", known, GRAPH, 1), 2.0 * abs(x))
+    np.testing.assert_allclose(evaluated("disagreement(x)", known, GRAPH, 1), -x)
+    np.testing.assert_allclose(evaluated("total(3 * x + disagreement(x))", known, GRAPH, 1), 9.0 * x, atol=1e-12)
+    assert check_claims([Claim.model_validate(STANDARD | {"signal": "total(y)"})], GRAPH, known.names)
+    with pytest.raises(ValueError, match="total takes one argument"):
+        check_expression("total(x, z)", known.names)
+
+
+def test_when_a_uav_was_lost_can_be_claimed_of_a_flight_that_was_long_enough(known: Known) -> None:
+    for name in ("z", "x"):
+        known.data[(name, 2)] = known.data[(name, 2)][:691]
+    claim = Claim.model_validate(STANDARD | {"metric": "last_time", "signal": "t", "tolerance": "< 8"})
+    (one,) = evaluate(known, [claim], "flight", GRAPH, duration=10.0)
+    assert (one.value, one.ok) == (6.9, True)
+    (short,) = evaluate(known, [claim], "flight", GRAPH, duration=9.0)
+    assert short.ok is None, "not flown"
+
+
+def test_first_time_within_a_threshold() -> None:
+    assert METRICS["first_time_within"].function(T, 2.0 - T, 0.5) == pytest.approx(1.5)
+    assert METRICS["first_time_within"].function(T, 2.0 + T, 0.5) == math.inf
