@@ -96,6 +96,8 @@ def pitch_rate_model(V, alpha, q, divisor, a):
 def level_deflections(V: float, a: Model) -> dict[str, float]:
     """What thrust (N) and elevator (rad) level flight at airspeed ``V`` (m/s) needs, by the nominal model."""
     lifting = 0.5 * a.rho * max(V, 1.0) ** 2 * a.S
-    alpha = (a.m * a.g / lifting - a.CL0) / a.CLa
+    # Here the elevator's lift counts: the pitching moment is balanced, Cm0 + Cma alpha + Cmde elevator = 0.
+    share = a.CLde / a.Cmde
+    alpha = (a.m * a.g / lifting - a.CL0 + share * a.Cm0) / (a.CLa - share * a.Cma)
     drag = lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha)
     return {"thrust": drag / math.cos(alpha), "elevator": -(a.Cm0 + a.Cma * alpha) / a.Cmde}
