@@ -43,8 +43,10 @@ __all__ = ["Crew", "columns", "load_compiled", "run"]
 
 _POLL = 0.001
 """Wall time between two looks at the mesh while a record or a greeting is awaited, s."""
+_ATTENTION = 0.02
+"""Least wall time between two looks at what the ground waits for, s."""
 _LOOK = 0.1
-"""Longest wall time between two looks at what the ground waits for, s."""
+"""Longest, s."""
 
 
 def columns(scheme: str) -> tuple[Column, ...]:
@@ -133,6 +135,8 @@ class Crew:
         self.waiter.add(gate, gate.read)
         for i, vehicle in enumerate(self.vehicles):
             self.waiter.add(vehicle, functools.partial(self.listen, i))
+        self.attended = 0.0
+        """When what the ground waits for was looked at (wall s, monotonic)."""
         self.ground = [GroundLink(self.seat(i)) for i in range(k)]
         for link in self.ground:
             for socket in link.sockets:
@@ -376,8 +380,11 @@ class Crew:
 
     def attend(self) -> None:
         """What the ground waits for, whether the swarm flies or is held."""
-        for link in self.ground:
-            link.attend()
+        now = time.monotonic()
+        if now - self.attended > _ATTENTION:
+            self.attended = now
+            for link in self.ground:
+                link.attend()
 
     @property
     def names(self) -> str:

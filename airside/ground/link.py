@@ -50,6 +50,7 @@ class GroundLink:
         self._schedules: dict[Peer, Schedule] = {
             peer: Schedule(rates_of(seat, socket is self._station)) for socket in self.sockets for peer in socket.peers
         }
+        self._flows = list(self._schedules.items())
         self._last_heartbeat = 0.0
         self._answered: dict[_Key, tuple[tuple[float, ...], float, Any]] = {}
         """By sender and command: its parameters, when, and the COMMAND_ACK."""
@@ -71,12 +72,10 @@ class GroundLink:
         self.seat.now_us = now_us
         self.seat.started = True
         self.failures.tell_what_acts(now_us)
-        for socket in self.sockets:
-            for peer in socket.peers:
-                if socket is self._station or peer.there:
-                    due = self.schedule(peer).due(now_us)
-                    if due:
-                        peer.send(*(STREAMS[n].make(self.seat) for n in due))
+        for peer, schedule in self._flows:
+            due = schedule.due(now_us)
+            if due and peer.there:
+                peer.send(*(STREAMS[n].make(self.seat) for n in due))
 
     def attend(self) -> None:
         """Between ticks, also while the swarm is held: HEARTBEAT, and what must not wait for ever."""
@@ -87,9 +86,9 @@ class GroundLink:
         self._last_heartbeat = now
         self.offboard.attend()
         self._callers.forget_the_silent()
-        self._schedules = {
-            peer: self._schedules[peer] for s in self.sockets for peer in s.peers if peer in self._schedules
-        }
+        present = [peer for socket in self.sockets for peer in socket.peers]
+        self._schedules = {peer: self.schedule(peer) for peer in present}
+        self._flows = list(self._schedules.items())
         beat = heartbeat(self.seat, self.seat.alive)
         for socket in self.sockets:
             for peer in socket.peers:
@@ -131,6 +130,7 @@ class GroundLink:
         """What flows to ``peer``."""
         if peer not in self._schedules:
             self._schedules[peer] = Schedule(self._rates)
+            self._flows = list(self._schedules.items())
         return self._schedules[peer]
 
     # From the ground.

@@ -37,11 +37,13 @@ class Offboard:
         self.refused_target = ""
         """Why the last target was not taken; empty if it was."""
 
+    @property
+    def _takes_attitudes(self) -> bool:
+        return not self._link.seat.leader and hasattr(self._references, "command_from_ground")
+
     def refused(self) -> str:
         """Why this UAV takes no targets; empty if it does."""
-        if self._link.seat.leader or hasattr(self._references, "command_from_ground"):
-            return ""
-        return "offboard: this follower takes no targets"
+        return "" if self._link.seat.leader or self._takes_attitudes else "offboard: this follower takes no targets"
 
     def fresh(self) -> bool:
         """Whether targets keep coming."""
@@ -50,7 +52,7 @@ class Offboard:
     def release(self) -> None:
         """The UAV's own commands are in force again."""
         seat = self._link.seat
-        if not seat.leader:
+        if self._takes_attitudes:
             seat.autopilots.reference_commands[seat.i, -1] = math.inf
         self._target = None
 
@@ -74,7 +76,7 @@ class Offboard:
 
     def _attitude(self, message: Any) -> None:
         seat = self._link.seat
-        if seat.leader:
+        if not self._takes_attitudes:
             return
         clock = int(seat.next_us - seat.autopilots.held_us[seat.i])
         row, why = self._references.command_from_ground(message, seat.autopilots.own[seat.i], clock)

@@ -330,11 +330,13 @@ class Schedule:
         self._last_us = [-(10**12)] * len(self._rates)
         self._last_wall = [-math.inf] * len(self._rates)
         self._next_us = 0
+        self._next_wall = 0.0
+        """Nothing is due before these times, simulated us and wall s (monotonic)."""
 
     def set(self, n: int, rate: float) -> None:
         """Set the rate of stream ``n``, Hz; 0 = silent."""
         self._rates[n] = rate
-        self._next_us = 0
+        self._next_us, self._next_wall = 0, 0.0
 
     def rate(self, n: int) -> float:
         """Rate of stream ``n``, Hz."""
@@ -345,21 +347,20 @@ class Schedule:
         if now_us < self._next_us:
             return []
         wall = time.monotonic()
+        if wall < self._next_wall:
+            return []
         found = []
-        following = now_us + 1_000_000
+        self._next_us, self._next_wall = now_us + 1_000_000, wall + 1.0
         for n, rate in enumerate(self._rates):
             if rate <= 0.0:
                 continue
             interval_us = 1e6 / rate
-            if now_us - self._last_us[n] >= _SLACK * interval_us:
-                if wall - self._last_wall[n] < _SLACK / rate:
-                    following = now_us  # due, but the wall clock is behind: look again at the next tick
-                    continue
+            behind = now_us - self._last_us[n]
+            if behind >= _SLACK * interval_us and wall - self._last_wall[n] >= _SLACK / rate:
                 # On the grid of the rate, so that a tick's length does not add up.
-                behind = now_us - self._last_us[n]
                 self._last_us[n] += int(behind // interval_us * interval_us) or int(interval_us)
                 self._last_wall[n] = wall
                 found.append(n)
-            following = min(following, int(self._last_us[n] + _SLACK * interval_us))
-        self._next_us = following
+            self._next_us = min(self._next_us, max(now_us, int(self._last_us[n] + _SLACK * interval_us)))
+            self._next_wall = min(self._next_wall, self._last_wall[n] + _SLACK / rate)
         return found

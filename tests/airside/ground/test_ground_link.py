@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ftcc.airside.ground.commands import COMMANDS
+from ftcc.airside.ground.requests import MESSAGES
 from ftcc.airside.ground.streams import STREAMS
 from ftcc.groundside.conversation import NoAnswerError, RefusedError
 from ftcc.groundside.registry import Card, Entry
@@ -393,6 +395,46 @@ def test_a_state_is_answered_whatever_strangers_send(bench, station):
     assert station.get(1, "K11") == 3.0
     assert np.array_equal(bench.crew.autopilots.gains, gains)
     assert bench.crew.ground[0].dropped()["bad_data"] > 500
+
+
+def anything(random: np.random.Generator, kind: Any) -> Any:
+    """A valid message of a kind to UAV 1 with random contents: every bit pattern, nan and infinity among them."""
+    values = []
+    for name, type_, length in zip(kind.fieldnames, kind.fieldtypes, array_lengths(kind), strict=True):
+        if name in ("target_system", "target_component"):
+            values.append(1)
+        elif type_ == "char":
+            values.append(random.bytes(length))
+        else:
+            bits = {"float": "<f4", "double": "<f8", "int8_t": "<i1", "uint8_t": "<u1", "int16_t": "<i2"}
+            bits |= {"uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4", "int64_t": "<i8", "uint64_t": "<u8"}
+            code = np.dtype(bits[type_])
+            drawn = np.frombuffer(random.bytes(code.itemsize * max(1, length)), code).tolist()
+            values.append(drawn if length else drawn[0])
+    return kind(*values)
+
+
+def array_lengths(kind: Any) -> list[int]:
+    """Of the fields of a kind of message, in the order of their names."""
+    by_name = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+    return [by_name[name] for name in kind.fieldnames]
+
+
+def test_valid_messages_with_any_contents_are_survived(bench, station):
+    random = np.random.default_rng(1)
+    kinds = [kind for kind in M.mavlink_map.values() if kind.msgname in MESSAGES]
+    assert len(kinds) == len(MESSAGES)
+    commands = list(COMMANDS)
+    for n in range(2000):
+        message = anything(random, kinds[n % len(kinds)])
+        if "command" in message.fieldnames and random.random() < 0.8:
+            message.command = commands[int(random.integers(len(commands)))]
+        station._socket.sendto(message.pack(station._codec._mav), (LOOPBACK, bench.block.of(1).ground))
+        if n % 20 == 0:
+            bench.answer(n // 20 + 1, LEVEL, np.zeros(4))
+    assert station.state(1).uav == 1
+    for array in (bench.crew.autopilots.gains, bench.crew.inbox.quality, bench.crew.controls):
+        assert np.isfinite(array).all()
 
 
 def test_before_the_first_state_it_answers_too(tmp_path, monkeypatch):
