@@ -23,8 +23,8 @@ pytestmark = [
     pytest.mark.timeout(300),
 ]
 
-SIZE = (1600, 1000)
-SCENE = (slice(60, 480), slice(10, 900))
+SIZE = (1280, 800)
+SCENE = (slice(50, 330), slice(10, 720))
 """Rows and columns of the picture that the 3D view fills."""
 
 
@@ -105,6 +105,9 @@ def open_page(browser, address: str, theme: str) -> None:  # type: ignore[no-unt
         "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
     )
     browser.get(f"{address}&renderer=webgl")
+
+
+def wait_until_drawn(browser) -> None:  # type: ignore[no-untyped-def]
     deadline = time.monotonic() + 120.0
     while time.monotonic() < deadline and colored(picture(browser)[SCENE]) < 0.002:
         time.sleep(1.0)
@@ -114,6 +117,7 @@ def open_page(browser, address: str, theme: str) -> None:  # type: ignore[no-unt
 def test_the_scene_is_drawn_and_advances_while_the_swarm_flies(dashboard, swarm, browser, theme):  # type: ignore[no-untyped-def]
     assert dashboard.address is not None
     open_page(browser, dashboard.address, theme)
+    wait_until_drawn(browser)
     early, early_t = picture(browser), swarm.t
     assert colored(early[SCENE]) > 0.002, "the 3D view is blank"
     # Drawn in software, the page lags behind the swarm by seconds.
@@ -136,13 +140,21 @@ def test_the_page_reaches_nobody_but_this_machine(dashboard, swarm, browser):  #
     assert dashboard.address is not None
     open_page(browser, dashboard.address, "dark")
     asked, refused = {}, set()
-    for entry in browser.get_log("performance"):
-        message = json.loads(entry["message"])["message"]
-        about = message["params"]
-        if message["method"] == "Network.requestWillBeSent":
-            asked[about["requestId"]] = about["request"]["url"]
-        if message["method"] == "Network.loadingFailed" and about.get("blockedReason") == "csp":
-            refused.add(about["requestId"])
+    deadline = time.monotonic() + 60.0
+    running = None
+    # Whatever the page asks for, it asks for within seconds of its program's start.
+    while time.monotonic() < (deadline if running is None else running + 8.0):
+        time.sleep(0.5)
+        for entry in browser.get_log("performance"):
+            message = json.loads(entry["message"])["message"]
+            about = message["params"]
+            if message["method"] == "Network.requestWillBeSent":
+                asked[about["requestId"]] = about["request"]["url"]
+            if message["method"] == "Network.loadingFailed" and about.get("blockedReason") == "csp":
+                refused.add(about["requestId"])
+        if running is None and any(url.split("?")[0].endswith(".wasm") for url in asked.values()):
+            running = time.monotonic()
+    assert running is not None, "the page did not load its program"
     outside = {request: url for request, url in asked.items() if url.startswith("http") and "//127.0.0.1:" not in url}
     assert len(outside) < len(asked), "nothing was seen of the page's own requests"
     assert {url for request, url in outside.items() if request not in refused} == set()
