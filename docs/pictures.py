@@ -1,0 +1,80 @@
+"""Draws the pictures of the README anew: ``python docs/pictures.py``.
+
+Needs Mesa's Vulkan drivers or a graphics card. Flies the scenarios in one process into a temporary folder.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import socket
+import tempfile
+import time
+from pathlib import Path
+
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from ftcc.groundside.mission import resolve
+from ftcc.groundside.replay import draw
+from ftcc.groundside.report.curves import Flown
+from ftcc.groundside.report.definitions import sheet_of
+from ftcc.groundside.report.report import draw_figures
+from ftcc.groundside.run import Run
+from ftcc.groundside.scenario import load
+from ftcc.groundside.simulate import simulate
+
+PICTURES = Path(__file__).parent / "pictures"
+DASHBOARDS = (("containment", "dashboard", 85.0), ("fire_monitoring", "fire", 60.0))
+"""Scenario, name of the picture, simulated time (s)."""
+FIGURES = ("altitude", "altitude_tracking")
+"""Of the first scenario."""
+WIDTH = 1400
+"""Pixels of a dashboard's picture."""
+
+
+def small(image: Image.Image, path: Path, width: int) -> None:
+    """Write a picture of at most ``width`` pixels in few colours."""
+    if image.width > width:
+        image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
+    image.convert("RGB").quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
+    print(f"{path}: {path.stat().st_size // 1000} kB")
+
+
+def dashboard(run: Run, folder: Path, path: Path, t: float) -> None:
+    """What the dashboard shows of a run at ``t``."""
+    recording = draw(run, folder / f"{path.stem}.rrd", rate=5.0)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    viewer = ViewerClient.spawn(headless=True, port=port)
+    try:
+        viewer.open(str(recording))
+        viewer.set_time("t", duration=t, play_state="paused")
+        time.sleep(2.0)  # until all is laid out
+        small(Image.open(io.BytesIO(viewer.take_screenshot())), path, WIDTH)
+    finally:
+        viewer.quit()
+
+
+def main() -> None:
+    """All pictures."""
+    os.environ["CI"] = "true"  # Rerun sends no usage statistics
+    PICTURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for scenario, picture, t in DASHBOARDS:
+            run = simulate(resolve(load(scenario, form="flight", duration=t + 1.0)), folder / scenario)
+            dashboard(run, folder, PICTURES / f"{picture}.png", t)
+        run = simulate(resolve(load(DASHBOARDS[0][0], form="flight")), folder / "whole")
+        mission = run.mission
+        sheet = sheet_of(mission)
+        few = sheet.model_copy(update={"figures": [figure for figure in sheet.figures if figure.name in FIGURES]})
+        happened = tuple(sorted({event[0] for event in mission.events}))
+        for drawn in draw_figures(few, [Flown(mission.case, run, mission, happened)], folder):
+            png = next(file for file in drawn.files if file.suffix == ".png")
+            small(Image.open(png), PICTURES / f"{drawn.name}.png", 900)
+
+
+if __name__ == "__main__":
+    main()
