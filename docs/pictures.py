@@ -30,14 +30,14 @@ DASHBOARDS = (("containment", "dashboard", 85.0), ("fire_monitoring", "fire", 60
 FIGURES = ("altitude", "altitude_tracking")
 """Of the first scenario."""
 WIDTH = 1400
-"""Pixels of a dashboard's picture."""
+"""Of pictures, in pixels."""
 
 
-def small(image: Image.Image, path: Path, width: int) -> None:
-    """Write a picture of at most ``width`` pixels in few colours."""
-    if image.width > width:
-        image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
-    image.convert("RGB").quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
+def small(image: Image.Image, path: Path) -> None:
+    """Write a picture of at most `WIDTH` pixels in few colours, those of the UAVs among them."""
+    if image.width > WIDTH:
+        image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
+    image.convert("RGB").quantize(256, kmeans=4, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}: {path.stat().st_size // 1000} kB")
 
 
@@ -52,7 +52,7 @@ def dashboard(run: Run, folder: Path, path: Path, t: float) -> None:
         viewer.open(str(recording))
         viewer.set_time("t", duration=t, play_state="paused")
         time.sleep(2.0)  # until all is laid out
-        small(Image.open(io.BytesIO(viewer.take_screenshot())), path, WIDTH)
+        small(Image.open(io.BytesIO(viewer.take_screenshot())), path)
     finally:
         viewer.quit()
 
@@ -73,7 +73,7 @@ def main() -> None:
         happened = tuple(sorted({event[0] for event in mission.events}))
         for drawn in draw_figures(few, [Flown(mission.case, run, mission, happened)], folder):
             png = next(file for file in drawn.files if file.suffix == ".png")
-            small(Image.open(png), PICTURES / f"{drawn.name}.png", 900)
+            small(Image.open(png), PICTURES / f"{drawn.name}.png")
 
 
 if __name__ == "__main__":
