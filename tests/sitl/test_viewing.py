@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import socket
+import statistics
+import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +16,8 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from ftcc.groundside import Run
+from ftcc.groundside import Run, Station
+from ftcc.groundside.feed import watched
 from tests.sitl.conftest import Flight
 
 DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
@@ -105,6 +109,32 @@ def test_a_flight_in_lockstep_opens_with_its_blueprint(fly: Callable[..., Flight
     colored = pictures[0].max(axis=2) - pictures[0].min(axis=2) > 40
     assert colored.mean() > 0.002, "the picture is blank"
     assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 40).mean() > 0.002, "the picture stands still"
+
+
+def test_a_command_from_the_ground_is_seen_at_once(
+    fly: Callable[..., Flight], environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A viewer has it 0.15 s later at most, the longest wait between two deliveries."""
+    monkeypatch.setenv("FTCC_RUNTIME_DIR", environment["FTCC_RUNTIME_DIR"])
+    flight = fly("demo", "--speed", "1", "--pack", "auto", "--viewer", "none")
+    flight.wait_until_flying()
+    arrived: list[tuple[float, str]] = []
+
+    def watch() -> None:
+        for snapshot in watched(flight.folder.name):
+            arrived.extend((time.monotonic(), event.text) for event in snapshot.events)
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    delays = []
+    with Station(flight.folder.name) as station:
+        for n in range(9):
+            begun = time.monotonic()
+            station.fault(2, "thrust", eff=0.9 + 0.005 * n)
+            flight.wait_until(lambda n=n: any(f"{0.9 + 0.005 * n:g}" in text for _, text in arrived), 20.0)  # type: ignore[misc]
+            delays.append(next(t for t, text in arrived if f"{0.9 + 0.005 * n:g}" in text) - begun)
+    flight.interrupt()
+    assert statistics.median(delays) < 0.35
 
 
 def test_the_view_of_a_killed_flight_is_readable(fly: Callable[..., Flight]) -> None:
