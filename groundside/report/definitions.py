@@ -45,6 +45,8 @@ class Panel(Strict):
     reference: str | None = Field(None, description="expression of what y follows; drawn thin in the same colour")
     limits: str | None = Field(None, description="actuator whose limits are drawn")
     window: tuple[float, float] | None = Field(None, description="s; a detail, beside the others")
+    equal: bool = Field(False, description="both axes to the same scale")
+    unwrap: bool = Field(False, description="y is an angle in rad that goes on beyond pi")
     shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
 
 
@@ -79,6 +81,7 @@ class Figure(Strict):
     title: str
     number: str = Field("", description="in the monograph")
     panels: list[Panel] = Field(min_length=1)
+    columns: int = Field(1, ge=1, le=3, description="of the panels that are no details")
     readings: list[Reading] = []
 
 

@@ -37,6 +37,8 @@ _INK = "#010203"
 """Stands for the colour of text: the page replaces it by its own, so that a figure suits light and dark."""
 _WIDTH, _ROW, _LEGEND = 7.2, 1.9, 0.35
 """Inches: of a figure, of a row of panels, of the legend."""
+_TALL = 2.0
+"""Height of a row with equal axes, in rows."""
 _IN_A_ROW = 3
 """Details beside each other."""
 _FAR = 3.0
@@ -88,20 +90,24 @@ class Drawn:
     files: tuple[Path, ...]
 
 
-def draw(asked: Sequence[Panel], flights: Sequence[Flown]) -> Any | None:
-    """Panels of one flight, colours by UAV, or of several, colours by flight; None if none has what they show."""
+def draw(asked: Sequence[Panel], flights: Sequence[Flown], beside: int = 1) -> Any | None:
+    """Panels of one flight, colours by UAV, or of several, colours by flight; None if none has what they show.
+
+    Details stand in a row of their own; of the other panels ``beside`` ones stand beside each other.
+    """
     panels = [panel for panel in asked if any(drawable(panel, flight) for flight in flights)]
     if not panels:
         return None
     with plt.rc_context(_STYLE):
         wide = [i for i, panel in enumerate(panels) if panel.window is None]
         details = [i for i, panel in enumerate(panels) if panel.window is not None]
-        rows: list[list[int]] = [[i] for i in wide]
+        rows = [wide[i : i + beside] for i in range(0, len(wide), beside)]
         rows += [details[i : i + _IN_A_ROW] for i in range(0, len(details), _IN_A_ROW)]
         columns = int(np.lcm.reduce([len(row) for row in rows]))
+        heights = [_TALL if any(panels[i].equal for i in row) else 1.0 for row in rows]
         mosaic: Any = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
-        height = _LEGEND + _ROW * len(rows)
-        made, axes = plt.subplot_mosaic(mosaic, figsize=(_WIDTH, height), layout="constrained")
+        size = (_WIDTH, _LEGEND + _ROW * sum(heights))
+        made, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
         for i, panel in enumerate(panels):
             _draw_panel(axes[str(i)], panel, flights)
         _legend(made, panels, flights)
@@ -119,8 +125,11 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
             color = hexadecimal(_RUN_COLORS[n % len(_RUN_COLORS)] if several else tints[curve.uav])
             if panel.pairs is not None and not several:
                 color = hexadecimal(colors(range(1, len(panel.pairs) + 1))[k + 1])
+            if panel.shared and not several:
+                color = _INK
+            y = np.unwrap(curve.y) if panel.unwrap else curve.y
             style = "--" if curve.uav in leaders and panel.pairs is None else "-"
-            axes.plot(*_thinned(curve.x, curve.y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
+            axes.plot(*_thinned(curve.x, y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
             if panel.shared:
                 break
         if n == 0:
@@ -132,6 +141,8 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
     unit = f", {_pretty(panel.unit)}" if panel.unit and panel.unit != "-" else ""
     axes.set(xlabel=f"{panel.x_label}, {_pretty(panel.x_unit)}", ylabel=f"{panel.label}{unit}")
     axes.margins(x=0.01)
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="datalim")
 
 
 def _draw_limits(axes: Axes, actuator: str, flight: Flown) -> None:

@@ -94,7 +94,7 @@ def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path) -> list[D
     own = all(flight.mission.name in sheet.scenarios for flight in flights)
     for figure in sheet.figures:
         panels = [panel for panel in figure.panels if own or panel.window is None]
-        made = draw(panels, flights)
+        made = draw(panels, flights, figure.columns)
         if made is not None:
             number = f"Figure {figure.number}" if figure.number else ""
             drawn.append(save(made, figure.name, figure.title, number, folder))
