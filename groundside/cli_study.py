@@ -71,6 +71,7 @@ def study(
     (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
 
     outcomes: list[Outcome] = []
+    wrong = 0
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
     )  # fmt: skip
@@ -79,8 +80,9 @@ def study(
         begun = time.monotonic()
 
         def report(outcome: Outcome) -> None:
+            nonlocal wrong
             outcomes.append(outcome)
-            wrong = sum(bool(one.error) for one in outcomes)
+            wrong += bool(outcome.error)
             text = f"flying {mission.name} {mission.case}" + (f", {wrong} with errors" if wrong else "")
             progress.update(task, completed=len(outcomes), description=text)
 

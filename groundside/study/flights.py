@@ -9,7 +9,6 @@ import functools
 import multiprocessing
 import os
 import signal
-import threading
 import time
 import traceback
 import warnings
@@ -156,15 +155,15 @@ def _one_thread() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _deaf_to_ctrl_c() -> Iterator[None]:
-    """Processes started meanwhile leave Ctrl-C to this one, from their first instruction on."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Processes started meanwhile leave Ctrl-C to this one, from their first instruction on.
+
+    They inherit that SIGINT is blocked. Here it only waits: ignored, one that comes meanwhile would be lost.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 # In the processes.

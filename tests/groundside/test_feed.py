@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import socket
+import statistics
 import threading
 import time
 from collections.abc import Iterator
@@ -77,13 +78,13 @@ def test_a_watcher_that_does_not_read_costs_nothing_and_misses_no_event(feed: tu
     station, name = feed
     link = stuck(name)
     told = [Event(t / 10.0, "info", f"event {t}") for t in range(2000)]
-    longest = 0.0
+    took = []
     for event in told:
         begun = time.perf_counter()
         station.offer(snapshot(event.t, (event,)))
-        longest = max(longest, time.perf_counter() - begun)
-    # A millisecond, most of it the encoding; the machine may be busy.
-    assert longest < 0.5
+        took.append(time.perf_counter() - begun)
+    # A millisecond, most of it the encoding; a machine that is busy may hold up single ones.
+    assert statistics.median(took) < 0.05
     arrived: list[Event] = []
     link.settimeout(0.5)
     lines = link.makefile("rb")
