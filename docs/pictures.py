@@ -15,6 +15,7 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from ftcc.groundside.dashboard.viewer import viewer_program
 from ftcc.groundside.mission import resolve
 from ftcc.groundside.replay import draw
 from ftcc.groundside.report.curves import Flown
@@ -47,7 +48,7 @@ def dashboard(run: Run, folder: Path, path: Path, t: float) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    viewer = ViewerClient.spawn(headless=True, port=port)
+    viewer = ViewerClient.spawn(headless=True, port=port, executable_path=str(viewer_program()))
     try:
         viewer.open(str(recording))
         viewer.set_time("t", duration=t, play_state="paused")

@@ -80,14 +80,17 @@ class Waiter:
 
 
 class Telemetry:
-    """When to report: at 10 Hz simulated or wall, whichever is slower."""
+    """When to report: at 10 Hz simulated or wall, whichever is slower, and at the end."""
 
     def __init__(self, timing: Timing) -> None:
         self._every = max(1, round(_TELEMETRY / timing.period))
+        self._end = timing.ticks
         self._last = -1e9
 
     def due(self, tick: int) -> bool:
         """Whether telemetry is due at this tick."""
+        if tick == self._end:
+            return True
         if tick % self._every:
             return False
         now = time.monotonic()

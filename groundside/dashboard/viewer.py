@@ -27,7 +27,7 @@ from ftcc.groundside.dashboard.viewer_page import PageServer
 if TYPE_CHECKING:
     import rerun as rr
 
-__all__ = ["BLUEPRINT", "Entry", "Kind", "Viewer", "write"]
+__all__ = ["BLUEPRINT", "Entry", "Kind", "Viewer", "viewer_program", "write"]
 
 Kind = Literal["web", "native", "none"]
 
@@ -198,7 +198,7 @@ class Viewer:
             # Rerun would take whoever listens there for the viewer.
             self._report(f"no viewer: port {self._data_port} is in use")
             return None
-        program = [str(_executable()), *options]
+        program = [str(viewer_program()), *options]
         if sys.platform == "linux":
             program = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid()), *program]
         # With CI set, Rerun neither sends usage statistics nor leaves their files in the user's home.
@@ -283,7 +283,7 @@ class Viewer:
             self._problem = problem
 
 
-def _executable() -> Path:
+def viewer_program() -> Path:
     """The viewer that the package rerun-sdk brings."""
     found = importlib.util.find_spec("rerun_cli")
     assert found is not None

@@ -23,6 +23,7 @@ from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
 from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
 from ftcc.groundside.snapshot import Snapshot, UavState
+from tests import rrd
 from tests.groundside.synthetic_swarm import (
     CUT as CUT_FROM_TO,
 )
@@ -74,7 +75,7 @@ def rows(path: Path, entity: str, component: str) -> tuple[np.ndarray, list[Any]
     """Times, s (nan where it holds always), and values of a component of an entity."""
     times: list[float] = []
     values: list[Any] = []
-    for chunk in rr.chunk.RrdReader(path).stream().to_chunks():
+    for chunk in rrd.chunks(path):
         batch = chunk.to_record_batch()
         if str(chunk.entity_path) != entity or component not in batch.schema.names:
             continue
@@ -299,6 +300,7 @@ def test_a_killed_recording_is_readable_to_its_last_seconds(tmp_path: Path) -> N
     times, _ = rows(path, "/plots/motion/z/uavs", "Scalars:scalars")
     # 0.05 s of wall time pass in 0.1 s of simulated time; pieces of 2 s are written.
     assert times[-1] >= killed_at - 6.0
+    path.write_bytes(rrd.whole(path.read_bytes()))
     assert len(rr.chunk.RrdReader(path).blueprints()) == 1
 
 
