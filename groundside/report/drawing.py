@@ -41,6 +41,8 @@ _TALL = 2.0
 """Height of a row with equal axes, in rows."""
 _IN_A_ROW = 3
 """Details beside each other."""
+_TICKS_OF_A_DETAIL = 4
+"""Intervals on the time axis of a detail at most: more labels would touch."""
 _FAR = 3.0
 """How far beyond the curves a limit may be and still be drawn, in heights of the axes."""
 _COLUMNS = 700
@@ -141,6 +143,8 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
     unit = f", {_pretty(panel.unit)}" if panel.unit and panel.unit != "-" else ""
     axes.set(xlabel=f"{panel.x_label}, {_pretty(panel.x_unit)}", ylabel=f"{panel.label}{unit}")
     axes.margins(x=0.01)
+    if panel.window is not None:
+        axes.locator_params(axis="x", nbins=_TICKS_OF_A_DETAIL)
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
 
@@ -253,13 +257,14 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
 
 
 def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
-    """Curves (name, colour, times, values) against time."""
+    """Curves (name, colour, times, values) of quantities that are never negative, against time, from zero up."""
     with plt.rc_context(_STYLE):
         made, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
         for name, color, t, y in curves:
             axes.plot(*_thinned(t, y), color=color, label=name)
         axes.set(xlabel="t, s", ylabel=label)
         axes.margins(x=0.01)
+        axes.set_ylim(bottom=0.0)
         made.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
     return made
 
