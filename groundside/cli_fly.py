@@ -36,6 +36,8 @@ __all__ = ["register"]
 console = Console()
 _BAD_INPUT = 2
 _FLIGHT_FAILED = 1
+_LAST_SYSTEM = 239
+"""Greatest MAVLink system id of a UAV."""
 
 _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 
@@ -96,6 +98,12 @@ def _check_key(key: Path | None) -> None:
         fail(f"--key {error}")
 
 
+def _check_systems(greatest: int, id_offset: int) -> None:
+    """Beyond them are the systems of ground stations."""
+    if not 0 <= id_offset <= _LAST_SYSTEM - greatest:
+        fail(f"--id-offset {id_offset}: must be from 0 to {_LAST_SYSTEM - greatest} with UAVs up to {greatest}")
+
+
 def fly(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario or the path of a TOML file.")] = "demo",
     form: Form = None,
@@ -115,6 +123,9 @@ def fly(
         typer.Option(metavar="HOST:PORT", help="Where a ground station listens, or none; default: 14550, 14540."),
     ] = None,
     key: Annotated[Path | None, typer.Option(help="Key file: sign the links to the ground, see `ftcc keys`.")] = None,
+    id_offset: Annotated[
+        int, typer.Option(help="Add this to the UAVs' ids in MAVLink, so that ground stations tell two swarms apart.")
+    ] = 0,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
     from ftcc.groundside.fly import Viewer
@@ -128,6 +139,7 @@ def fly(
     count = _pack(pack, len(mission.vehicles))
     listeners = _listeners(mavlink)
     _check_key(key)
+    _check_systems(max(spec.uav for spec in mission.vehicles), id_offset)
     folder = new_run_folder(mission, out)
 
     from ftcc.groundside.fly import FlightOptions
@@ -150,6 +162,7 @@ def fly(
         open_browser=browser,
         listeners=listeners,
         key=key,
+        id_offset=id_offset,
     )
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"), console=console

@@ -107,6 +107,10 @@ class Conversation:
             raise NoAnswerError(f"swarm {self.entry.name} has no UAV {uav}; its UAVs are {there}")
         return self._cards[uav]
 
+    def system(self, uav: int) -> int:
+        """MAVLink system id of a UAV."""
+        return self.card(uav).system
+
     def get(self, uav: int, name: str) -> float:
         """The value in force.
 
@@ -132,7 +136,7 @@ class Conversation:
         if np.float32(value) == np.float32(before):
             return before
         raw = struct.unpack("<f", struct.pack("<i", int(value)))[0] if integer else value
-        message = dialect.MAVLink_param_set_message(uav, AUTOPILOT, name.encode(), raw, kind)
+        message = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, kind)
         self.texts[uav] = []
 
         def answers(heard: Any) -> bool:
@@ -151,7 +155,7 @@ class Conversation:
         found: dict[int, tuple[str, float]] = {}
         count = 1
         for _ in range(self._tries):
-            self.send(uav, dialect.MAVLink_param_request_list_message(uav, AUTOPILOT))
+            self.send(uav, dialect.MAVLink_param_request_list_message(self.system(uav), AUTOPILOT))
             until = time.monotonic() + self._timeout
             while len(found) < count and time.monotonic() < until:
                 for message in self.receive(uav, until):
@@ -164,7 +168,7 @@ class Conversation:
 
     def _read(self, uav: int, name: str) -> tuple[float, int]:
         """Value and type of a parameter."""
-        request = dialect.MAVLink_param_request_read_message(uav, AUTOPILOT, name.encode()[:16], -1)
+        request = dialect.MAVLink_param_request_read_message(self.system(uav), AUTOPILOT, name.encode()[:16], -1)
         return self._parameter(uav, request, name)
 
     def _parameter(self, uav: int, request: Any, name: str) -> tuple[float, int]:
@@ -190,7 +194,8 @@ class Conversation:
         """
         given = (*parameters, *(_NAN,) * (7 - len(parameters)))
         requests = [
-            dialect.MAVLink_command_long_message(uav, AUTOPILOT, command, n, *given) for n in range(self._tries)
+            dialect.MAVLink_command_long_message(self.system(uav), AUTOPILOT, command, n, *given)
+            for n in range(self._tries)
         ]
         self.texts[uav] = []
         name = dialect.enums["MAV_CMD"][command].name.removeprefix("MAV_CMD_")
@@ -204,7 +209,7 @@ class Conversation:
         """A message of a UAV, by REQUEST_MESSAGE."""
         name = dialect.mavlink_map[message].msgname
         asked = dialect.MAVLink_command_long_message(
-            uav, AUTOPILOT, dialect.MAV_CMD_REQUEST_MESSAGE, 0, message, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN
+            self.system(uav), AUTOPILOT, dialect.MAV_CMD_REQUEST_MESSAGE, 0, message, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN
         )
         return self._ask(uav, [asked], lambda m: m.get_type() == name, name)
 
@@ -233,7 +238,7 @@ class Conversation:
         datagram, sender = self._socket.recvfrom(4096)
         if sender != (LOOPBACK, self.card(uav).port):
             return []
-        messages = [m for m in self._codec.parse(datagram) if m.get_srcSystem() == uav]
+        messages = [m for m in self._codec.parse(datagram) if m.get_srcSystem() == self.system(uav)]
         for message in messages:
             if message.get_type() == "STATUSTEXT":
                 self.texts.setdefault(uav, []).append(message.text)

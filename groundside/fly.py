@@ -53,6 +53,8 @@ class FlightOptions:
     """Where other ground stations may listen."""
     key: Path | None = None
     """Key file for signed links to the ground."""
+    id_offset: int = 0
+    """What UAVs' ids have added as MAVLink systems towards the ground."""
 
 
 @dataclass
@@ -139,6 +141,7 @@ def fly(
         held=options.held,
         listeners=options.listeners,
         key=options.key,
+        id_offset=options.id_offset,
         on_event=on_event,
     )
     # The fork server must exist before this process opens anything.
@@ -146,7 +149,9 @@ def fly(
     signals = [signal_.name for signal_ in mission.scheme.signals]
     uavs = [spec.uav for spec in mission.vehicles]
     sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
-    station = Monitor(ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog")
+    station = Monitor(
+        ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog", options.id_offset
+    )
     log = EventLog(folder / "events.jsonl")
     flight = _Flight(mission, swarm, station, None, None, log, say)
     control = None
@@ -256,7 +261,13 @@ def _entry(mission: Mission, options: FlightOptions, ports: PortBlock, address: 
         scenario=mission.name,
         folder=str(folder.resolve()),
         vehicles=tuple(
-            Card(spec.uav, spec.role, ports.of(spec.uav).ground, tuple(n.uav for n in spec.neighbours))
+            Card(
+                spec.uav,
+                spec.uav + options.id_offset,
+                spec.role,
+                ports.of(spec.uav).ground,
+                tuple(n.uav for n in spec.neighbours),
+            )
             for spec in mission.autopilots
         ),
         key=None if options.key is None else str(options.key.resolve()),

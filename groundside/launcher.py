@@ -114,6 +114,7 @@ class Swarm:
     held : stay at the first tick until `resume`.
     listeners : where other ground stations may listen.
     key : key file for signed links to the ground.
+    id_offset : what UAVs' ids have added as MAVLink systems towards the ground.
     on_event : called with everything worth showing.
     """
 
@@ -129,6 +130,7 @@ class Swarm:
         held: bool = False,
         listeners: tuple[tuple[str, int], ...] = (),
         key: Path | None = None,
+        id_offset: int = 0,
         on_event: Callable[[Event], None],
     ) -> None:
         self.mission = mission
@@ -152,6 +154,7 @@ class Swarm:
             listeners=listeners,
             key=key,
             home=mission.home,
+            id_offset=id_offset,
         )
         self.groups = groups
 

@@ -39,7 +39,7 @@ class _Heard:
 class Monitor:
     """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given.
 
-    It believes what comes from the ports in ``sources`` alone.
+    It believes what comes from the ports in ``sources`` alone. Systems are UAVs' ids and ``id_offset``.
     """
 
     def __init__(
@@ -50,10 +50,12 @@ class Monitor:
         plant: str,
         signals: Sequence[str],
         log: Path | None = None,
+        id_offset: int = 0,
     ) -> None:
         self._endpoint = Endpoint(STATION, 1, port, only=sources)
         self._endpoint.enlarge_buffer()
         self._uavs = {uav: _Heard() for uav in uavs}
+        self._id_offset = id_offset
         self._signals = signals
         self._truth = truth_array(plant)
         self._plant = find(plant)
@@ -77,7 +79,7 @@ class Monitor:
         """Take in all telemetry that has arrived."""
         for message in self._endpoint.receive():
             self._write(message)
-            heard = self._uavs.get(message.get_srcSystem())
+            heard = self._uavs.get(message.get_srcSystem() - self._id_offset)
             if heard is not None:
                 self._take(heard, message)
 

@@ -21,6 +21,8 @@ class Card:
     """A UAV of a running swarm."""
 
     uav: int
+    system: int
+    """Its MAVLink system id."""
     role: str
     """"follower" or "leader"."""
     port: int

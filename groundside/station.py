@@ -236,7 +236,9 @@ class Station(Conversation):
             | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
             | dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
         )
-        target = dialect.MAVLink_set_attitude_target_message(0, uav, AUTOPILOT, ignored, wanted, 0.0, 0.0, 0.0, 0.0)
+        target = dialect.MAVLink_set_attitude_target_message(
+            0, self.system(uav), AUTOPILOT, ignored, wanted, 0.0, 0.0, 0.0, 0.0
+        )
         self.set(uav, "COM_OF_LOSS_T", 0.0)
         self.send(uav, target)
         self.mode(uav, "offboard")

@@ -51,6 +51,12 @@ class Setting:
     """Key file; with it everything towards the ground is signed, and what comes from there must be."""
     home: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the origin of the local frame lies: latitude, longitude (deg), altitude of z = 0 (m)."""
+    id_offset: int = 0
+    """What UAVs' ids have added towards the ground."""
+
+    def system(self, uav: int) -> int:
+        """MAVLink system id of a UAV towards the ground."""
+        return uav + self.id_offset
 
     @property
     def datagrams(self) -> int:

@@ -138,7 +138,7 @@ class Vehicles:
             for spec, port in zip(specs, ports, strict=True)
         ]
         self.station = [
-            Endpoint(spec.uav, SIMULATOR, port.truth, (LOOPBACK, setting.station))
+            Endpoint(setting.system(spec.uav), SIMULATOR, port.truth, (LOOPBACK, setting.station))
             for spec, port in zip(specs, ports, strict=True)
         ]
         parts = setting.folder / "parts"

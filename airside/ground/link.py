@@ -34,16 +34,18 @@ class GroundLink:
 
     def __init__(self, seat: Seat) -> None:
         self.seat = seat
-        setting, uav = seat.setting, seat.spec.uav
-        ports = setting.ports[uav]
+        setting = seat.setting
+        self.system = setting.system(seat.spec.uav)
+        """MAVLink system id."""
+        ports = setting.ports[seat.spec.uav]
         self._signing: Signing | None = None
         if setting.key is not None:
-            memory = setting.key.with_name(f"{setting.key.name}.stamps") / f"{uav}-{AUTOPILOT}.json"
+            memory = setting.key.with_name(f"{setting.key.name}.stamps") / f"{self.system}-{AUTOPILOT}.json"
             self._signing = Signing(read_key(setting.key), memory)
         station = (LOOPBACK, setting.station)
-        self._station = GroundSocket(uav, AUTOPILOT, ports.telemetry, station, self._signing)
-        self._callers = GroundSocket(uav, AUTOPILOT, ports.ground, None, self._signing)
-        listeners = [GroundSocket(uav, AUTOPILOT, 0, to, self._signing) for to in setting.listeners]
+        self._station = GroundSocket(self.system, AUTOPILOT, ports.telemetry, station, self._signing)
+        self._callers = GroundSocket(self.system, AUTOPILOT, ports.ground, None, self._signing)
+        listeners = [GroundSocket(self.system, AUTOPILOT, 0, to, self._signing) for to in setting.listeners]
         self.sockets = (self._station, self._callers, *listeners)
         """To be listened to."""
         self._rates = rates_of(seat, station=False)
@@ -140,11 +142,11 @@ class GroundLink:
         for peer, message in socket.receive():
             kind = message.get_type()
             handle = MESSAGES.get(kind)
-            if handle is None or message.get_srcSystem() == self.seat.spec.uav:
+            if handle is None or message.get_srcSystem() == self.system:
                 continue
             system = getattr(message, "target_system", 0)
             component = getattr(message, "target_component", 0)
-            if system not in (0, self.seat.spec.uav) or component not in (0, AUTOPILOT):
+            if system not in (0, self.system) or component not in (0, AUTOPILOT):
                 continue
             if self._signing is not None and kind in CHANGING:
                 self._signing.remember()

@@ -298,7 +298,7 @@ def _autopilot_version(seat: Seat) -> Any:
     version = 1 << 24 | 15 << 16 | 255
     nothing = (0,) * 8
     return _M.MAVLink_autopilot_version_message(
-        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, seat.spec.uav
+        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, seat.setting.system(seat.spec.uav)
     )
 
 

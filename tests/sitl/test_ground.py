@@ -212,6 +212,31 @@ def test_the_command_line_reaches_a_swarm_in_real_time(fly: Callable[..., Flight
         assert expected in told
 
 
+def test_two_swarms_have_systems_of_their_own_at_one_ground_station(fly: Callable[..., Flight], ftcc: Ftcc) -> None:
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as ground:
+        ground.bind(("127.0.0.1", 0))
+        ground.settimeout(60.0)
+        here = ["--mavlink", f"127.0.0.1:{ground.getsockname()[1]}", "--pack", "auto", "--hold"]
+        fly("containment", *here, name="first")
+        fly("containment", "--id-offset", "100", *here, name="second")
+        codec = Codec(245, 190)
+        systems: set[int] = set()
+        while len(systems) < 16:
+            systems |= {message.get_srcSystem() for message in codec.parse(ground.recv(4096))}
+    assert systems == {*range(1, 9), *range(101, 109)}
+    with Station("second") as station:
+        assert station.fault(1, "elevator", at=20.0, eff=0.9) == 20.0
+        assert station.state(8).role == "leader"
+    with Station("first") as station:
+        assert station.get(1, "FAIL_EFF") != pytest.approx(0.9)
+
+
+def test_systems_of_ground_stations_are_not_taken(ftcc: Ftcc) -> None:
+    refused = ftcc("fly", "containment", "--id-offset", "232")
+    assert refused.returncode == 2
+    assert "must be from 0 to 231 with UAVs up to 8" in refused.stderr
+
+
 def test_a_vehicle_that_has_died_is_missed(fly: Callable[..., Flight], ftcc: Ftcc) -> None:
     flight = fly("containment", "--duration", "300", "--mavlink", "none", *SLOW)
     flight.wait_until_flying()

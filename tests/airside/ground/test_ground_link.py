@@ -37,7 +37,7 @@ def flying(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **setting: Any) -> I
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path / "runtime"))
     with closing(Bench(tmp_path, 1000, neighbours=(2, 6), **setting)) as alone, alone as bench:
         bench.answer(0, LEVEL, np.zeros(4))
-        card = Card(1, "follower", bench.block.of(1).ground, (2, 6))
+        card = Card(1, 1, "follower", bench.block.of(1).ground, (2, 6))
         entry = Entry("bench", 1, "containment", str(tmp_path), (card,), None, (0, 0), None, 0.0)
         key = setting.get("key")
         with Station(entry, timeout=0.3, tries=2, key=key) as station:
@@ -440,7 +440,7 @@ def test_valid_messages_with_any_contents_are_survived(bench, station):
 def test_before_the_first_state_it_answers_too(tmp_path, monkeypatch):
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path / "runtime"))
     with closing(Bench(tmp_path, 9)) as alone, alone as bench:
-        card = Card(1, "follower", bench.block.of(1).ground, ())
+        card = Card(1, 1, "follower", bench.block.of(1).ground, ())
         with Station(Entry("bench", 1, "", "", (card,), None, (0, 0), None, 0.0), timeout=0.5) as station:
             assert station.state(1).t == 0.0
         bench.vehicle.send(*state_messages(0, LEVEL, np.zeros(4)))
