@@ -11,9 +11,10 @@ from types import ModuleType
 import tomli_w
 
 from ftcc.airside.model import Model
+from ftcc.airside.references.position import Fire
 from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import FAULT_TOLERANCE, Scheme
-from ftcc.airside.spec import AutopilotSpec, Neighbour
+from ftcc.airside.spec import AutopilotSpec, Neighbour, OwnReference
 from ftcc.groundside.checks import (
     IDEAL,
     Findings,
@@ -88,6 +89,14 @@ class Mission:
     def uavs(self) -> tuple[int, ...]:
         """Ids, in the order of the specs."""
         return self.graph.uavs
+
+    @property
+    def fire(self) -> Fire | None:
+        """What the swarm flies around, as the first UAV knows it; all know the same but for their posts."""
+        own = self.autopilots[0].reference
+        if self.scheme.plant != "position" or not isinstance(own, OwnReference):
+            return None
+        return Fire(*own.parameters[: len(Fire._fields)])
 
 
 def resolve(scenario: Scenario) -> Mission:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable
 
-__all__ = ["CUT", "FRESH", "GRAY", "STALE", "Color", "colors", "hexadecimal"]
+__all__ = ["CUT", "FIRE", "FRESH", "GRAY", "STALE", "Color", "colors", "hexadecimal"]
 
 Color = tuple[int, int, int]
 
@@ -15,6 +15,7 @@ FRESH: Color = (122, 134, 126)
 STALE: Color = (224, 160, 20)
 CUT: Color = (226, 48, 48)
 """Edges over which the receiver hears news, hears none, and cannot hear any."""
+FIRE: Color = (222, 84, 40)
 
 _PALETTE: tuple[Color, ...] = (
     (72, 126, 216),

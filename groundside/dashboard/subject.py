@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 from ftcc.airside.references.position import Fire
 from ftcc.airside.scheme import Quantity
-from ftcc.airside.spec import OwnReference
 from ftcc.link.actuators import SLOT
 from ftcc.link.graph import Graph
 from ftcc.sim.obstacles import Obstacle
@@ -57,7 +56,7 @@ class Subject:
             limits={name: follower.limits[SLOT[name]] for name in mission.scheme.commands},
             disturbances=plant.DISTURBANCES,
             obstacles=mission.obstacles,
-            fire=_fire(mission),
+            fire=mission.fire,
         )
 
     @property
@@ -69,14 +68,6 @@ class Subject:
     def leaders(self) -> tuple[int, ...]:
         """Ids, ascending."""
         return tuple(sorted(self.graph.leaders))
-
-
-def _fire(mission: Mission) -> Fire | None:
-    """The fire as the first UAV knows it; all know the same but for their posts."""
-    own = mission.autopilots[0].reference
-    if mission.scheme.plant != "position" or not isinstance(own, OwnReference):
-        return None
-    return Fire(*own.parameters[: len(Fire._fields)])
 
 
 def _family(plant: str, graph: Graph) -> Family:

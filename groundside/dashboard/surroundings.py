@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ftcc.airside.references.position import Command, border
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.palette import GRAY
+from ftcc.groundside.palette import FIRE, GRAY
 from ftcc.groundside.snapshot import Snapshot
 
 __all__ = ["Surroundings"]
@@ -21,8 +21,7 @@ _MARGIN = 6.0
 _APART = 1.0
 """Leaders that begin farther apart than this along the flight span a box, not two levels, m."""
 _OBSTACLE = (*GRAY, 70)
-_FIRE = (222, 84, 40)
-_BURNT = (*_FIRE, 36)
+_BURNT = (*FIRE, 36)
 _FRONT_EVERY = 1.0
 """Time from one front to the next, s: it grows by a metre a second."""
 _DEEP = 200.0
@@ -87,7 +86,7 @@ class Surroundings:
         fan = [(0, i, i + 1) for i in range(1, len(line))]
         area = rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
         return [
-            Entry("/world/fire/front", t, rr.LineStrips3D([line], colors=_FIRE, radii=rr.Radius.ui_points(2.0))),
+            Entry("/world/fire/front", t, rr.LineStrips3D([line], colors=FIRE, radii=rr.Radius.ui_points(2.0))),
             Entry("/world/fire/area", t, area),
         ]
 

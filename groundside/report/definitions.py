@@ -48,6 +48,9 @@ class Panel(Strict):
     equal: bool = Field(False, description="both axes to the same scale")
     unwrap: bool = Field(False, description="y is an angle in rad that goes on beyond pi")
     shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
+    surroundings: Literal["obstacles", "fire"] | None = Field(
+        None, description='"obstacles" where x is the forward position and y the altitude; "fire" on a map, north up'
+    )
 
 
 class Reading(Strict):

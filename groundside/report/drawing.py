@@ -19,7 +19,8 @@ from matplotlib import pyplot as plt
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ftcc.groundside.palette import GRAY, colors, hexadecimal
+from ftcc.airside.references.position import Command, border
+from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
 from ftcc.groundside.report.definitions import Panel
 from ftcc.link.actuators import SLOT
@@ -136,6 +137,8 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
                 break
         if n == 0:
             _draw_bounds(axes, panel, flight)
+        if n == 0 and panel.surroundings is not None:
+            _draw_surroundings(axes, panel.surroundings, flight)
     if panel.limits is not None:
         _draw_limits(axes, panel.limits, flights[0])
     if panel.x == "t" and not several:
@@ -156,6 +159,24 @@ def _draw_limits(axes: Axes, actuator: str, flight: Flown) -> None:
     for limit in follower.limits[SLOT[actuator]]:
         if low - _FAR * (high - low) <= limit <= high + _FAR * (high - low):
             axes.axhline(limit, color=hexadecimal(GRAY), linewidth=0.8, linestyle=":")
+
+
+def _draw_surroundings(axes: Axes, kind: str, flight: Flown) -> None:
+    """Obstacles as blocks; the fire's front in the beginning (dashed) and in the end."""
+    if kind == "obstacles":
+        low, _ = axes.get_ylim()
+        for start, end, top in flight.mission.obstacles:
+            axes.fill_between((start, end), top, low, color=hexadecimal(GRAY), alpha=0.35, linewidth=0.0)
+        axes.set_ylim(bottom=low)
+        return
+    fire, signals, uav = flight.mission.fire, flight.signals, flight.mission.graph.followers[0]
+    if fire is None or "fire_north" not in signals.names:
+        return
+    t, north, east = (signals.column(name, uav) for name in ("t", "fire_north", "fire_east"))
+    for k, style in ((0, "--"), (-1, "-")):
+        here = Command(float(t[k]), float(north[k]), float(east[k]), 0.0, 0.0)
+        x, y = border(fire, [here], float(t[k])).T
+        axes.plot(y, x, style, color=hexadecimal(FIRE), linewidth=1.0, zorder=2)
 
 
 def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
@@ -198,6 +219,13 @@ def _legend(made: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> Non
         entries.append(Line2D([], [], color=gray, linestyle=":", label="limit"))
     if any(panel.reference for panel in panels):
         entries.append(Line2D([], [], color=_INK, linestyle="--", linewidth=0.5, label="reference"))
+    shown = {panel.surroundings for panel in panels}
+    if "obstacles" in shown and flights[0].mission.obstacles:
+        entries.append(Line2D([], [], color=gray, linewidth=5.0, alpha=0.35, label="obstacle"))
+    if "fire" in shown:
+        red = hexadecimal(FIRE)
+        entries.append(Line2D([], [], color=red, linestyle="--", label="fire, first"))
+        entries.append(Line2D([], [], color=red, label="fire, last"))
     if any(panel.true for panel in panels):
         entries.append(Line2D([], [], color=_INK, linestyle=":", label="true value"))
     if entries:

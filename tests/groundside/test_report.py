@@ -182,7 +182,12 @@ def test_a_sheet_draws_what_its_scheme_records(path: Path) -> None:
     flight = fly(mission)
     assert unknown_columns(sheet, flight.names) == []
     whole = [panel for figure in sheet.figures for panel in figure.panels if panel.window is None]
-    assert draw(whole, [Flown("flight", flight, mission)]) is not None
+    made = draw(whole, [Flown("flight", flight, mission)])
+    blocks = [block for axes in made.axes for block in axes.collections]
+    assert len(blocks) == len(mission.obstacles)
+    explained = {text.get_text() for text in made.legends[0].get_texts()}
+    assert ("obstacle" in explained) == bool(mission.obstacles)
+    assert ("fire, first" in explained) == (mission.fire is not None)
 
 
 def test_a_scheme_without_a_sheet_has_figures_of_what_it_declares() -> None:
