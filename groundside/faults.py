@@ -65,5 +65,5 @@ def fault_text(fault: FaultFields) -> str:
     if fault.actuator is not None and fault.kind in ("wrong", "intermittent"):
         unit = unit_of(fault.actuator)
         how = "" if fault.kind == "wrong" else "intermittent "
-        return f"{fault.actuator} {how}fault: effectiveness {fault.effectiveness:g}, bias {fault.bias:g} {unit}"
+        return f"{fault.actuator} {how}fault: effectiveness {fault.effectiveness:.4g}, bias {fault.bias:.4g} {unit}"
     return f"{what} {fault.kind}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.blueprints import blueprint
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
@@ -18,15 +19,19 @@ class Artists:
 
     def __init__(self, subject: Subject, first: Snapshot) -> None:
         self._scene = Scene(subject, first)
+        self._attitudes = Attitudes(subject) if subject.family == "attitude" else None
         self._plots = Plots(subject)
         self._table = Table(subject)
 
     def static(self) -> list[Entry]:
         """What is logged once, the blueprint first."""
-        layout = Entry(BLUEPRINT, None, blueprint(self._scene, self._plots, self._table))
-        return [layout, *self._scene.static(), *self._plots.static()]
+        layout = Entry(BLUEPRINT, None, blueprint(self._scene, self._attitudes, self._plots, self._table))
+        attitudes = self._attitudes.static() if self._attitudes is not None else []
+        return [layout, *self._scene.static(), *attitudes, *self._plots.static()]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """One instant, and what happened before it."""
         entries = [*self._scene.draw(snapshot), *self._plots.draw(snapshot), *self._table.draw(snapshot)]
+        if self._attitudes is not None:
+            entries += self._attitudes.draw(snapshot)
         return entries + events(snapshot.events)

@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from ftcc.groundside.dashboard.table import log_view
 
 if TYPE_CHECKING:
+    from ftcc.groundside.dashboard.attitudes import Attitudes
     from ftcc.groundside.dashboard.plots import Plots
     from ftcc.groundside.dashboard.scene import Scene
     from ftcc.groundside.dashboard.table import Table
@@ -19,15 +20,16 @@ _BESIDE = 4
 """Plots below one another; more stand in two columns."""
 
 
-def blueprint(scene: Scene, plots: Plots, table: Table) -> rrb.Blueprint:
+def blueprint(scene: Scene, attitudes: Attitudes | None, plots: Plots, table: Table) -> rrb.Blueprint:
     """The layout that goes into the viewer and into the recording."""
+    swarm = scene.view()
     groups = plots.views()
     first = groups.pop("Tracking")
     tabs = [_stack(views, name) for name, views in groups.items()]
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
-                scene.view(),
+                swarm if attitudes is None else rrb.Tabs(attitudes.view(), swarm),
                 rrb.Horizontal(
                     scene.links.view(),
                     rrb.Vertical(table.view(), log_view(), row_shares=[3, 2]),

@@ -42,6 +42,8 @@ _REFERENCES = ("_r", "_ref", "_d", "hat", "_hat", "_id")
 """How the signal is called that says what a state should be, the nearest to the law first."""
 _NO_LIMIT = 2.0 * math.pi
 """Limits of angles beyond this stand for none, rad."""
+_LONGEST = 38
+"""Characters of a title that half the room shows."""
 _MOST = 6
 """Panels in a group."""
 
@@ -186,8 +188,15 @@ def _adaptation(subject: Subject) -> list[Panel]:
 
 
 def _title(signal: Quantity) -> str:
-    meaning = signal.meaning or signal.name
-    return f"{meaning[0].upper()}{meaning[1:]} {signal.name}" if signal.meaning else signal.name
+    if not signal.meaning:
+        return signal.name
+    title = f"{signal.meaning[0].upper()}{signal.meaning[1:]} {signal.name}"
+    # What stands behind a comma tells of the several components which one it is, as the symbol does.
+    return (
+        title
+        if len(title) <= _LONGEST
+        else f"{title.partition(',')[0].removesuffix(signal.name).strip()} {signal.name}"
+    )
 
 
 def uavs_of(panel: Panel, subject: Subject) -> Sequence[int]:

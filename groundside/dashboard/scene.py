@@ -14,15 +14,13 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.links import Links
-from ftcc.groundside.dashboard.shapes import NORTH_TO_WORLD, SPAN, airframe, outline, times
+from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.surroundings import Surroundings
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import faults, faulty, name, silent_since
+from ftcc.groundside.dashboard.words import label
 from ftcc.groundside.palette import colors
 from ftcc.groundside.snapshot import Snapshot, UavState
-from ftcc.sim.plant import TRUTH
-from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 
 __all__ = ["LANE", "TRAIL", "Scene"]
 
@@ -76,7 +74,7 @@ class Scene:
         self._surroundings = Surroundings(subject, self._positions)
         self.links = Links(subject)
         self._labels: dict[int, str] = {}
-        self._message = np.zeros(len(STATE_MESSAGE))
+        self._poses = Poses()
 
     @property
     def title(self) -> str:
@@ -142,16 +140,16 @@ class Scene:
         for uav, state in snapshot.uavs.items():
             if uav in self._index and np.isfinite(after[self._index[uav], 0]):
                 place = after[self._index[uav]]
-                entries.append(Entry(f"/world/uav/{uav}", t, _pose(place, self._attitude(state.truth))))
+                entries.append(Entry(f"/world/uav/{uav}", t, self._poses.of(place, state.truth)))
                 entries += self._reference(t, uav, state)
         before = np.where(np.isfinite(before), before, after)
         entries.append(Entry("/world/trails", t, rr.LineStrips3D.from_fields(strips=np.stack([before, after], axis=1))))
         for uav in self._uavs:
-            label = self._label(uav, snapshot)
-            if label != self._labels.get(uav):
-                self._labels[uav] = label
-                text = rr.Points3D.from_fields(labels=label, show_labels=True)
-                entries.append(Entry(f"/world/uav/{uav}/label", t, text))
+            text = label(uav, uav in self._leaders, snapshot)
+            if text != self._labels.get(uav):
+                self._labels[uav] = text
+                shown = rr.Points3D.from_fields(labels=text, show_labels=True)
+                entries.append(Entry(f"/world/uav/{uav}/label", t, shown))
         entries += self._surroundings.draw(snapshot, after)
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 
@@ -173,22 +171,4 @@ class Scene:
         if not all(map(math.isfinite, wanted.values())):
             return []
         truth = {**state.truth, **wanted}
-        return [Entry(f"/world/reference/{uav}", t, _pose(self._where(uav, truth), self._attitude(truth)))]
-
-    def _attitude(self, truth: Mapping[str, float]) -> rr.Quaternion:
-        encode_state(np.array([truth.get(field, 0.0) for field in TRUTH]), self._message)
-        w, x, y, z = times(NORTH_TO_WORLD, self._message[:4])
-        return rr.Quaternion(xyzw=(x, y, z, w))
-
-    def _label(self, uav: int, snapshot: Snapshot) -> str:
-        label = name(uav) + (" leader" if uav in self._leaders else "")
-        state = snapshot.uavs.get(uav)
-        if state is None:
-            return f"{label}: not heard"
-        broken = len(faulty(state))
-        trouble = silent_since(state, snapshot) or (f"{broken} faults" if broken > 1 else faults(state))
-        return f"{label}: {trouble}" if trouble else label
-
-
-def _pose(place: NDArray[np.float64], attitude: rr.Quaternion) -> rr.Transform3D:
-    return rr.Transform3D(translation=place, quaternion=attitude)
+        return [Entry(f"/world/reference/{uav}", t, self._poses.of(self._where(uav, truth), truth))]

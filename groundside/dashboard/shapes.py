@@ -1,14 +1,18 @@
-"""Shapes and directions of the three-dimensional view: an airframe, arrows, rotations."""
+"""Shapes and directions of the three-dimensional views: an airframe, arrows, poses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
-__all__ = ["NORTH_TO_WORLD", "SPAN", "airframe", "arrows", "outline", "times"]
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.sensors import STATE_MESSAGE, encode_state
+
+__all__ = ["SPAN", "Poses", "airframe", "arrows", "outline"]
 
 # Airframe, m: x forward, y right, z down; corners of flat parts, each a fan of triangles.
 SPAN = 3.24
@@ -22,11 +26,11 @@ _PARTS = (
 _BODY = ((1.0, 0.0, 0.0), 0.3, 0.14, (-1.3, 0.0, -0.05))
 """Nose, station and half-width of the thickest section, tail."""
 
-NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
+_NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 """Rotation from north-east-down to east-north-up as a quaternion, scalar first."""
 
 
-def times(a: Sequence[float], b: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float, float]:
+def _times(a: Sequence[float], b: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float, float]:
     """Product of two quaternions, scalar first."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -34,6 +38,19 @@ def times(a: Sequence[float], b: Sequence[float] | NDArray[np.float64]) -> tuple
         a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
         a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
     )
+
+
+class Poses:
+    """Where an aircraft is drawn, and how it lies in the air there."""
+
+    def __init__(self) -> None:
+        self._message = np.zeros(len(STATE_MESSAGE))
+
+    def of(self, place: Sequence[float] | NDArray[np.float64], truth: Mapping[str, float]) -> rr.Transform3D:
+        """At ``place`` (east, north, up; m) with the attitude of true states by name; a missing one is 0."""
+        encode_state(np.array([truth.get(field, 0.0) for field in TRUTH]), self._message)
+        w, x, y, z = _times(_NORTH_TO_WORLD, self._message[:4])
+        return rr.Transform3D(translation=place, quaternion=rr.Quaternion(xyzw=(x, y, z, w)))
 
 
 def arrows(

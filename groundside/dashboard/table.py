@@ -40,21 +40,22 @@ class Table:
         return [Entry("/swarm", snapshot.t, rr.TextDocument(self._text(snapshot), media_type="text/markdown"))]
 
     def _text(self, snapshot: Snapshot) -> str:
-        heads = ("UAV", "mode", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks")
-        rows = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
-        rows += [self._row(uav, snapshot) for uav in sorted(self._subject.graph.uavs)]
-        return "\n".join(rows)
+        heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks", "mode")
+        rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in sorted(self._subject.graph.uavs))]
+        # A recording knows no modes.
+        shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
+        return "\n".join(f"| {' | '.join(row[:shown])} |" for row in rows)
 
-    def _row(self, uav: int, snapshot: Snapshot) -> str:
+    def _row(self, uav: int, snapshot: Snapshot) -> tuple[str, ...]:
         leads = uav in self._subject.leaders
         label = f"{uav} leader" if leads else f"{uav}"
         state = snapshot.uavs.get(uav)
         if state is None:
-            return f"| {label} | | | | not heard | | |"
+            return (label, "", "", "not heard", "", "", "")
         silent = silent_since(state, snapshot)
         health = silent or faults(state) or ("" if leads else "healthy")
         z, speed = state.truth["z"], state.truth["V"]
-        return f"| {label} | {state.mode} | {z:.1f} | {speed:.2f} | {health} | {_heard(state)} | {state.late} |"
+        return (label, f"{z:.1f}", f"{speed:.2f}", health, _heard(state), str(state.late), state.mode)
 
 
 def _heard(state: UavState) -> str:

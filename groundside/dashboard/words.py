@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ftcc.groundside.snapshot import Snapshot, UavState
 
-__all__ = ["faults", "faulty", "name", "silent_since"]
+__all__ = ["faults", "faulty", "label", "name", "silent_since"]
 
 _SILENT = 1.0
 """Age of a UAV's telemetry from which it counts as silent, s."""
@@ -13,6 +13,17 @@ _SILENT = 1.0
 def name(uav: int) -> str:
     """What a UAV is called everywhere."""
     return f"UAV {uav}"
+
+
+def label(uav: int, leads: bool, snapshot: Snapshot) -> str:
+    """What is written at an aircraft: its name, and what is wrong with it."""
+    called = name(uav) + (" leader" if leads else "")
+    state = snapshot.uavs.get(uav)
+    if state is None:
+        return f"{called}: not heard"
+    broken = len(faulty(state))
+    trouble = silent_since(state, snapshot) or (f"{broken} faults" if broken > 1 else faults(state))
+    return f"{called}: {trouble}" if trouble else called
 
 
 def faults(uav: UavState) -> str:

@@ -1,0 +1,97 @@
+"""How the aircraft lie in the air: side by side, each seen along its own course, its reference as an outline."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline
+from ftcc.groundside.dashboard.subject import Subject
+from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.dashboard.words import label
+from ftcc.groundside.palette import colors
+from ftcc.groundside.snapshot import Snapshot
+
+__all__ = ["Attitudes"]
+
+_SPACING, _RISE = 1.4 * SPAN, 0.7 * SPAN
+"""Between aircraft of a row, and from row to row, m."""
+_REFERENCES = {"mu": "mu_d", "alpha": "alpha_d", "beta": "beta_d"}
+"""Signals that say how a UAV should lie in the air, by the true state that they stand for."""
+
+
+class Attitudes:
+    """Draws the true attitude of every aircraft with its course turned ahead, away from who looks.
+
+    Where aircraft turn away from each other their places soon tell nothing; their attitudes are what they agree on. The
+    places here are slots, and not true.
+    """
+
+    title = "Attitudes, each along its own course (outlines: references; places are slots)"
+
+    def __init__(self, subject: Subject) -> None:
+        self._uavs = sorted(subject.graph.uavs)
+        self._colors = colors(self._uavs)
+        self._leaders = set(subject.leaders)
+        rows = math.ceil(math.sqrt(0.5 * len(self._uavs)))
+        columns = math.ceil(len(self._uavs) / rows)
+        self._slots = {
+            uav: ((i % columns - 0.5 * (columns - 1)) * _SPACING, 0.0, (0.5 * (rows - 1) - i // columns) * _RISE)
+            for i, uav in enumerate(self._uavs)
+        }
+        self._distance = max(rows * _RISE, 0.5 * columns * _SPACING)
+        self._poses = Poses()
+        self._labels: dict[int, str] = {}
+
+    def view(self) -> rrb.Spatial3DView:
+        """The slots from behind, and a little above."""
+        eye = 1.3 * self._distance * np.array([0.0, -1.0, 0.3])
+        return rrb.Spatial3DView(
+            origin="/attitudes",
+            name=self.title,
+            eye_controls=rrb.EyeControls3D(
+                kind=rrb.Eye3DKind.Orbital, position=eye, look_target=(0.0, 0.0, 0.0), eye_up=(0, 0, 1)
+            ),
+            line_grid=rrb.LineGrid3D(visible=False),
+        )
+
+    def static(self) -> list[Entry]:
+        """Shapes, colours, slots."""
+        entries = [Entry("/attitudes", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
+        vertices, normals = airframe(1.0)
+        for uav in self._uavs:
+            tint = self._colors[uav]
+            shape = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=tint)
+            ghost = rr.LineStrips3D(outline(1.0), colors=tint, radii=rr.Radius.ui_points(0.8))
+            x, y, z = self._slots[uav]
+            above = rr.Points3D((x, y, z + 0.3 * SPAN), colors=tint, radii=rr.Radius.ui_points(0.5))
+            entries += [
+                Entry(f"/attitudes/uav/{uav}", None, shape),
+                Entry(f"/attitudes/reference/{uav}", None, ghost),
+                Entry(f"/attitudes/label/{uav}", None, above),
+            ]
+        return entries
+
+    def draw(self, snapshot: Snapshot) -> list[Entry]:
+        """Everything that moves."""
+        entries = []
+        for uav in self._uavs:
+            text = label(uav, uav in self._leaders, snapshot)
+            if text != self._labels.get(uav):
+                self._labels[uav] = text
+                entries.append(
+                    Entry(f"/attitudes/label/{uav}", snapshot.t, rr.Points3D.from_fields(labels=text, show_labels=True))
+                )
+            state = snapshot.uavs.get(uav)
+            if state is None:
+                continue
+            ahead = {**state.truth, "chi": 0.0}
+            entries.append(Entry(f"/attitudes/uav/{uav}", snapshot.t, self._poses.of(self._slots[uav], ahead)))
+            wanted = {name: state.signals.get(signal, math.nan) for name, signal in _REFERENCES.items()}
+            if all(map(math.isfinite, wanted.values())):
+                pose = self._poses.of(self._slots[uav], {**ahead, **wanted})
+                entries.append(Entry(f"/attitudes/reference/{uav}", snapshot.t, pose))
+        return entries
