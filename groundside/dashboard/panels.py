@@ -67,6 +67,8 @@ class Panel:
     """How to read it."""
     band: bool = False
     """Shade what lies between the leaders."""
+    obstacles: bool = False
+    """Draw the top of the obstacle that any UAV is above."""
     degrees: bool = False
     """Show angles in degrees, as the chapters on attitude do."""
 
@@ -111,6 +113,12 @@ def _motion(subject: Subject) -> list[Panel]:
             if r in names
         ]
         band = name == "z" and subject.family == "containment"
+        obstacles = name == "z" and bool(subject.obstacles)
+        notes = [
+            *(["band: hull"] if band else []),
+            *(["gray: obstacles"] if obstacles else []),
+            *(["thin: reference"] if references else []),
+        ]
         panels.append(
             Panel(
                 path=f"/plots/motion/{name}",
@@ -120,7 +128,8 @@ def _motion(subject: Subject) -> list[Panel]:
                 second=("signals", references[0]) if references else None,
                 everybody=True,
                 band=band,
-                notes=(*(["band: between the leaders"] if band else []), *(["thin: reference"] if references else [])),
+                obstacles=obstacles,
+                notes=tuple(notes),
             )
         )
     return panels

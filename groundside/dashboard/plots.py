@@ -68,6 +68,8 @@ class Plots:
             curves += [("upper bound", GRAY, 1.0), ("lower bound", GRAY, 1.0)]
         if panel.limits is not None:
             curves += [("lower limit", GRAY, 1.0), ("upper limit", GRAY, 1.0)]
+        if panel.obstacles:
+            curves.append(("top of the obstacle", GRAY, 5.0))
         return curves
 
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
@@ -84,6 +86,10 @@ class Plots:
             values += [panel.bound * panel.scale, -panel.bound * panel.scale]
         if panel.limits is not None:
             values += [limit * panel.scale for limit in panel.limits]
+        if panel.obstacles:
+            places = [state.truth["x"] for state in states if state is not None]
+            beneath = [o.top for o in self._subject.obstacles if any(o.start < x < o.end for x in places)]
+            values.append(max(beneath, default=math.nan))
         return values
 
     def _followers(self, uavs: Sequence[int]) -> list[int]:

@@ -20,10 +20,12 @@ import pytest
 import rerun as rr
 
 from ftcc.groundside.dashboard import Dashboard
+from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
 from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
 from ftcc.groundside.snapshot import Snapshot, UavState
+from ftcc.sim.obstacles import Obstacle
 from tests import rrd
 from tests.groundside.synthetic_swarm import (
     CUT as CUT_FROM_TO,
@@ -142,6 +144,14 @@ def test_series_are_named_and_coloured_by_uav(recording: Path) -> None:
     assert shape[0][0] == tints[0][2]
 
 
+def test_an_obstacle_is_drawn_beneath_the_altitudes_of_those_who_are_above_it() -> None:
+    subject = dataclasses.replace(SUBJECT, obstacles=(Obstacle(250.0, 350.0, 870.0),))
+    plots = Plots(subject)
+    before, above = ({entry.path: entry.what for entry in plots.draw(snapshot(t))} for t in (5.0, 10.0))
+    assert np.isnan(before["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1])
+    assert above["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1] == 870.0
+
+
 def test_tracking_errors_with_their_bounds(recording: Path) -> None:
     uavs = snapshot(21.0).uavs
     values = at(recording, "/plots/errors/S1", "Scalars:scalars", 21.0)
@@ -243,7 +253,7 @@ def test_the_recording_carries_its_blueprint(recording: Path) -> None:
     said = [chunk.to_record_batch() for chunk in reader.stream(store=blueprint).to_chunks()]
     texts = {str(value) for batch in said for name in batch.schema.names if ":" in name for value in batch[name]}
     for title in (
-        "Altitude, m (band: between the leaders, thin: reference)",
+        "Altitude, m (band: hull, thin: reference)",
         "Altitude tracking error S1, m",
         "Events",
     ):
