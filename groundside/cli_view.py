@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
 from ftcc.groundside.cli_common import fail, terminal, warn
 
-__all__ = ["register"]
+if TYPE_CHECKING:
+    from ftcc.groundside.dashboard import Dashboard
+    from ftcc.groundside.run import Run
+    from ftcc.groundside.snapshot import Event
+
+__all__ = ["register", "show_past"]
 
 Kind = Literal["web", "native"]
+
+_PAST_RATE, _PAST_PICTURES = 2.0, 400
+"""How finely a swarm's past is drawn: at most so many pictures a simulated second, and so many in all."""
+_PATIENCE = 20.0
+"""Longest wait for a viewer that is still starting, s."""
 
 _Viewer = Annotated[str, typer.Option("--viewer", help="web or native.")]
 _Browser = Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")]
@@ -35,12 +45,12 @@ def watch(
     viewer: _Viewer = "web",
     browser: _Browser = True,
 ) -> None:
-    """Show a running swarm from now on; Ctrl-C detaches, and the swarm flies on."""
+    """Show a running swarm, what it has flown and what it goes on to; Ctrl-C detaches, and the swarm flies on."""
     from ftcc.groundside.dashboard import Dashboard, Subject
     from ftcc.groundside.feed import watched
     from ftcc.groundside.registry import find
+    from ftcc.groundside.replay import events_of
     from ftcc.groundside.run import Run
-    from ftcc.groundside.snapshot import Event
 
     kind = _kind(viewer)
     try:
@@ -54,12 +64,16 @@ def watch(
         if dashboard.address:
             out.print(f"dashboard: {dashboard.address}", soft_wrap=True, highlight=False)
         out.print(f"watching {entry.name}; Ctrl-C detaches", soft_wrap=True, highlight=False)
-        before = tuple(Event(float(e["t"]), str(e["severity"]), str(e["text"]), e.get("uav")) for e in run.events)
         with contextlib.suppress(KeyboardInterrupt):
+            told: list[Event] | None = show_past(run, dashboard)
             for snapshot in watched(entry.name):
-                earlier = tuple(event for event in before if event not in snapshot.events)
-                dashboard.log(snapshot if not earlier else snapshot.after(earlier))
-                before = ()
+                if told is not None:
+                    # What was logged between the past and the first news.
+                    missed = [e for e in events_of(Run(entry.folder)) if e not in told and e not in snapshot.events]
+                    dashboard.log(snapshot.after(tuple(missed)))
+                    told = None
+                else:
+                    dashboard.log(snapshot)
                 for problem in dashboard.take_problems():
                     warn(problem.text)
             out.print(f"{entry.name} has landed; Ctrl-C closes the dashboard", soft_wrap=True, highlight=False)
@@ -68,6 +82,22 @@ def watch(
         fail(f"{entry.name} cannot be watched: {error.strerror or error}")
     finally:
         dashboard.close()
+
+
+def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
+    """Draw what a swarm has flown so far, coarser the longer it is, and return the events that were told with it."""
+    from ftcc.groundside.replay import snapshots_of
+    from ftcc.groundside.run import NothingRecordedError
+
+    told: list[Event] = []
+    try:
+        rate = min(_PAST_RATE, _PAST_PICTURES / max(run.end, 1.0))
+        for snapshot in snapshots_of(run, rate):
+            dashboard.log(snapshot, patience=_PATIENCE)
+            told += snapshot.events
+    except NothingRecordedError:
+        pass  # It has hardly started.
+    return told
 
 
 def replay(

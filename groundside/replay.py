@@ -15,7 +15,7 @@ from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
 
-__all__ = ["RATE", "draw", "snapshots_of"]
+__all__ = ["RATE", "draw", "events_of", "snapshots_of"]
 
 RATE = 10.0
 """Snapshots per simulated second."""
@@ -59,6 +59,16 @@ class _Links:
         }  # fmt: skip
 
 
+def events_of(run: Run) -> list[Event]:
+    """What was logged, in the order of the log."""
+    return [
+        Event(
+            float(e["t"]), str(e["severity"]), str(e["text"]), e.get("uav"), e.get("who", ""), e.get("outcome", "")
+        )
+        for e in run.events
+    ]  # fmt: skip
+
+
 def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
     """The run at ``rate`` (Hz of simulated time), from its beginning to its last recorded row."""
     mission = run.mission
@@ -79,7 +89,7 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
     }
     times = {uav: run.column("t", uav) for uav in run.uavs}
     links = _Links(run)
-    events = [Event(float(e["t"]), str(e["severity"]), str(e["text"]), e.get("uav")) for e in run.events]
+    events = events_of(run)
     told = 0
     for k in range(math.floor(run.end * rate + _CLOSE) + 1):
         t = k / rate

@@ -92,7 +92,7 @@ def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDAr
 
     ordered = _ordered(columns)
     table = pa.Table.from_arrays([pa.array(values[c.name]) for c in ordered], schema=arrow_schema(ordered))
-    unfinished = path.with_suffix(".unfinished")
+    unfinished = path.with_suffix(f".{os.getpid()}")
     pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
     unfinished.replace(path)
 
@@ -102,7 +102,7 @@ class NothingRecordedError(RunError):
 
 
 class Run:
-    """A recorded flight.
+    """A recorded flight; of one that goes on, what there was when it was first looked at.
 
     Parameters
     ----------
@@ -154,9 +154,11 @@ class Run:
 
     @property
     def file(self) -> Path:
-        """``signals.parquet``, merged from the parts if need be."""
+        """``signals.parquet``, merged from the parts where there is none or they have grown since."""
         path = self.path / "signals.parquet"
-        return path if path.is_file() else self.merge()
+        parts = [part.stat().st_mtime_ns for part in (self.path / "parts").glob("*.arrows")]
+        merged = path.is_file() and path.stat().st_mtime_ns >= max(parts, default=0)
+        return path if merged else self.merge()
 
     @functools.cached_property
     def signals(self) -> Any:
@@ -164,12 +166,17 @@ class Run:
         return self._table(None)
 
     @functools.cached_property
-    def columns(self) -> dict[str, Column]:
-        """Name, unit and meaning of every column."""
+    def _open(self) -> Any:
+        """The file, kept open: a run that goes on may be merged anew meanwhile, and this one shows one state of it."""
         import pyarrow.parquet as pq
 
+        return self._readable(lambda: pq.ParquetFile(self.file))
+
+    @functools.cached_property
+    def columns(self) -> dict[str, Column]:
+        """Name, unit and meaning of every column."""
         found = {}
-        for field in self._readable(lambda: pq.read_schema(self.file)):
+        for field in self._open.schema_arrow:
             notes = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
             found[field.name] = Column(field.name, notes.get("unit", ""), notes.get("meaning", ""))
         return found
@@ -190,9 +197,7 @@ class Run:
 
     def _table(self, names: list[str] | None) -> Any:
         """Columns of the recording, or all."""
-        import pyarrow.parquet as pq
-
-        return self._readable(lambda: pq.read_table(self.file, columns=names))
+        return self._readable(lambda: self._open.read(columns=names))
 
     def _readable(self, read: Callable[[], Any]) -> Any:
         """What ``read`` gives, or a message that says which file is damaged and what may help."""
@@ -257,7 +262,6 @@ class Run:
         order = np.lexsort((values["uav"], values["t"]))
         target = self.path / "signals.parquet"
         write_table(target, columns, {name: column[order] for name, column in values.items()})
-        self.__dict__.pop("signals", None)
         return target
 
     @functools.cached_property

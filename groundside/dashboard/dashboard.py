@@ -80,8 +80,8 @@ class Dashboard:
             self._viewer = Viewer(viewer, ports, open_browser, self._to_viewer)
             self.address = self._viewer.address
 
-    def log(self, snapshot: Snapshot) -> None:
-        """Draw ``snapshot``."""
+    def log(self, snapshot: Snapshot, patience: float = 0.0) -> None:
+        """Draw ``snapshot``; waits for a viewer that lags for ``patience`` (wall s) at most."""
         if self._recording is None and self._viewer is None:
             return
         self._t = snapshot.t
@@ -94,7 +94,7 @@ class Dashboard:
         entries += self._artists.draw(snapshot)
         entries += self._own_events()
         if self._viewer is not None:
-            self._viewer.show(entries)
+            self._viewer.show(entries, patience)
         if self._recording is not None:
             write(self._recording, entries)
 

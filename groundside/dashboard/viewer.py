@@ -152,12 +152,12 @@ class Viewer:
         self._thread = threading.Thread(target=self._feed, name="viewer", daemon=True)
         self._thread.start()
 
-    def show(self, entries: list[Entry]) -> None:
-        """Show ``entries`` soon, or never; returns at once."""
+    def show(self, entries: list[Entry], patience: float = 0.0) -> None:
+        """Show ``entries`` soon, or never; waits for a viewer that lags for ``patience`` (wall s) at most."""
         if self._ended.is_set():
             return
         try:
-            self._frames.put_nowait(entries)
+            self._frames.put(entries, patience > 0.0, patience)
         except queue.Full:
             self._report(_BEHIND)
 

@@ -9,14 +9,17 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from ftcc.groundside import Run, Station
+from ftcc.groundside.cli_view import show_past
+from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.viewer import viewer_program
 from ftcc.groundside.feed import watched
+from ftcc.groundside.snapshot import Snapshot
 from tests import rrd
 from tests.sitl.conftest import Flight
 
@@ -139,6 +142,26 @@ def test_a_command_from_the_ground_is_seen_at_once(
             delays.append(next(t for t, text in arrived if f"{0.9 + 0.005 * n:g}" in text) - begun)
     flight.interrupt()
     assert statistics.median(delays) < 0.35
+
+
+def test_who_watches_late_sees_the_past_and_the_run_stays_whole(fly: Callable[..., Flight]) -> None:
+    flight = fly("demo", "--speed", "4", "--pack", "auto", "--viewer", "none")
+    flight.wait_until_flying()
+    flight.wait_until(lambda: "leader commanded" in flight.output)  # at 10 s
+    drawn: list[Snapshot] = []
+
+    class Board:
+        def log(self, snapshot: Snapshot, patience: float) -> None:
+            drawn.append(snapshot)
+
+    told = show_past(Run(flight.folder), cast(Dashboard, Board()))
+    assert drawn[0].t == 0.0
+    assert drawn[-1].t > 6.0
+    assert [event.text for event in told] == [event.text for snapshot in drawn for event in snapshot.events]
+    flight.wait_until(lambda: "disturbance" in flight.output)  # at 25 s
+    flight.interrupt()
+    assert flight.wait() == 0
+    assert Run(flight.folder).end > 24.0 > drawn[-1].t
 
 
 def test_the_view_of_a_killed_flight_is_readable(fly: Callable[..., Flight]) -> None:
