@@ -26,7 +26,11 @@ from ftcc.groundside.scenario import load
 from ftcc.groundside.simulate import simulate
 
 PICTURES = Path(__file__).parent / "pictures"
-DASHBOARDS = (("containment", "dashboard", 85.0), ("fire_monitoring", "fire", 60.0))
+DASHBOARDS = (
+    ("containment", "dashboard", 85.0),
+    ("fire_monitoring", "fire", 60.0),
+    ("directed_attitude", "attitude", 40.4),
+)
 """Scenario, name of the picture, simulated time (s)."""
 FIGURES = ("altitude", "altitude_tracking")
 """Of the first scenario."""

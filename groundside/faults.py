@@ -59,11 +59,11 @@ def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
 
 def fault_text(fault: FaultFields) -> str:
     """A fault in words, for the log."""
-    what = fault.actuator or f"navigation ({fault.navigation})"
+    what = fault.actuator.replace("_", " ") if fault.actuator else f"navigation ({fault.navigation})"
     if fault.kind == "ok" or (fault.kind == "wrong" and fault.actuator and (fault.effectiveness, fault.bias) == (1, 0)):
         return f"{what} repaired"
     if fault.actuator is not None and fault.kind in ("wrong", "intermittent"):
-        unit = unit_of(fault.actuator)
+        unit = f" {unit_of(fault.actuator)}".removesuffix(" -")
         how = "" if fault.kind == "wrong" else "intermittent "
-        return f"{fault.actuator} {how}fault: effectiveness {fault.effectiveness:.4g}, bias {fault.bias:.4g} {unit}"
+        return f"{what} {how}fault: effectiveness {fault.effectiveness:.4g}, bias {fault.bias:.4g}{unit}"
     return f"{what} {fault.kind}"

@@ -19,6 +19,8 @@ from ftcc.link.graph import Graph
 
 __all__ = ["Links"]
 
+_ASIDE = 0.2
+"""Distance of a note from its arrow; the circle of followers has radius 1."""
 _LOSSY = 0.01
 """Share of lost records from which it is written at an edge."""
 _FORGET = 20.0
@@ -38,6 +40,9 @@ class Links:
         self._plan = _plan(graph, set(subject.leaders))
         plan = np.array([self._plan[uav] for uav in self._uavs])
         self._plan_origins, self._plan_vectors = arrows(plan[self._ends[:, 0]], plan[self._ends[:, 1]], 0.16, 0.035)
+        x, y = self._plan_vectors.T / np.linalg.norm(self._plan_vectors, axis=1)
+        self._plan_notes = self._plan_origins + 0.62 * self._plan_vectors + _ASIDE * np.column_stack((y, -x))
+        """Nearer to who hears, and beside the arrow: those of the two directions stand apart."""
         self._tints: list[Color] = []
         self._notes: list[str] = []
         self._counted = np.zeros((len(self._edges), 2))
@@ -48,7 +53,7 @@ class Links:
         """Who hears whom."""
         return rrb.Spatial2DView(
             origin="/graph",
-            name="Links (gray fresh, amber stale, red cut; share lost)",
+            name="Links (amber stale, red cut; age, share lost)",
             visual_bounds=rrb.VisualBounds2D(x_range=(-1.9, 1.9), y_range=(-1.9, 1.9)),
         )
 
@@ -90,7 +95,7 @@ class Links:
             self._notes = notes
             which = [i for i, text in enumerate(notes) if text]
             texts = rr.Points2D(
-                (self._plan_origins + 0.6 * self._plan_vectors)[which],
+                self._plan_notes[which],
                 labels=[notes[i] for i in which],
                 show_labels=True,
                 colors=[tints[i] for i in which],
@@ -124,7 +129,7 @@ def _note(link: LinkState | None, tint: Color, loss: float) -> str:
         return f"{10 * round(10.0 * loss)} %" if loss > 0.05 else ("1 %" if loss > _LOSSY else "")
     if link is None or math.isinf(link.age):
         return "cut, never heard" if link is not None and link.cut else "not heard yet"
-    return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s old"
+    return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s"
 
 
 def _plan(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:

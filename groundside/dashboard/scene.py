@@ -87,7 +87,7 @@ class Scene:
 
     def view(self) -> rrb.Spatial3DView:
         """The swarm from behind, right and above."""
-        eye = self._radius * np.array([0.5, -1.5, 0.75])
+        eye = self._radius * np.array([0.45, -1.6, 1.05])
         return rrb.Spatial3DView(
             origin="/world/centre",
             contents="/world/**",
