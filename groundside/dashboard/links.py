@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ftcc.groundside.dashboard.shapes import arrows
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
+from ftcc.groundside.dashboard.words import silent_since
 from ftcc.groundside.palette import CUT, FRESH, STALE, Color, colors
 from ftcc.groundside.snapshot import LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
@@ -90,7 +91,10 @@ class Links:
             entries.append(Entry("/world/links", t, rr.Arrows3D.from_fields(colors=tints, radii=widths)))
             entries.append(Entry("/graph/links", t, rr.Arrows2D.from_fields(colors=tints, radii=widths)))
         loss = self._loss(links)
-        notes = [_note(link, tint, share) for link, tint, share in zip(links, tints, loss, strict=True)]
+        notes = [
+            "" if _silent(receiver, snapshot) else _note(link, tint, share)
+            for (_, receiver), link, tint, share in zip(self._edges, links, tints, loss, strict=True)
+        ]
         if notes != self._notes:
             self._notes = notes
             which = [i for i, text in enumerate(notes) if text]
@@ -121,6 +125,12 @@ class Links:
 def _link(uavs: Mapping[int, UavState], sender: int, receiver: int) -> LinkState | None:
     state = uavs.get(receiver)
     return state.links.get(sender) if state is not None else None
+
+
+def _silent(receiver: int, snapshot: Snapshot) -> bool:
+    """Whether a UAV that was heard tells no more, so that nobody knows what it hears."""
+    state = snapshot.uavs.get(receiver)
+    return state is not None and bool(silent_since(state, snapshot))
 
 
 def _note(link: LinkState | None, tint: Color, loss: float) -> str:

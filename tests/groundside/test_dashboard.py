@@ -265,13 +265,15 @@ def test_a_uav_that_falls_silent_is_said_to_be(tmp_path: Path) -> None:
     silent: UavState | None = None
     for snap in flight(4.0):
         uavs = dict(snap.uavs)
-        silent = uavs[5] if snap.t <= 1.0 else silent
+        silent = dataclasses.replace(uavs[5], links={}) if snap.t <= 1.0 else silent
         del uavs[6]
         assert silent is not None
         dashboard.log(Snapshot(snap.t, uavs | {5: silent}, snap.events))
     dashboard.close()
     assert at(tmp_path / "swarm.rrd", "/world/uav/5/label", "Points3D:labels", 4.0) == ["UAV 5: silent since 1 s"]
     assert at(tmp_path / "swarm.rrd", "/world/uav/6/label", "Points3D:labels", 4.0) == ["UAV 6: not heard"]
+    notes = at(tmp_path / "swarm.rrd", "/graph/notes", "Points2D:labels", 4.0)
+    assert notes == ["not heard yet"] * len(GRAPH.senders(6)), "what UAV 5 hears, nobody knows"
     assert np.isnan(at(tmp_path / "swarm.rrd", "/plots/motion/z/uavs", "Scalars:scalars", 4.0)[5])
 
 
