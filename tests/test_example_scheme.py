@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from ftcc.groundside import Run, ScenarioError, load, resolve
-from ftcc.groundside.cli import list_all
+from ftcc.groundside.cli.scenarios import list_all
 from ftcc.groundside.dashboard.panels import panels_of
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.mission import Mission

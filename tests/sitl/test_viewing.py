@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside import Run, Station
-from ftcc.groundside.cli_view import show_past
+from ftcc.groundside.cli.view import show_past
 from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.viewer import viewer_program
 from ftcc.groundside.feed import watched

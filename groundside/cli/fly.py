@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from ftcc.groundside.cli_common import (
+from ftcc.groundside.cli.common import (
     Duration,
     Form,
     Out,
@@ -31,7 +31,7 @@ from ftcc.groundside.cli_common import (
 if TYPE_CHECKING:
     from ftcc.link.ground import Address
 
-__all__ = ["register"]
+__all__ = ["doctor", "fly", "ps", "stop"]
 
 console = Console()
 _BAD_INPUT = 2
@@ -40,12 +40,6 @@ _LAST_SYSTEM = 239
 """Greatest MAVLink system id of a UAV."""
 
 _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to ``app``."""
-    for command in (fly, ps, stop, doctor):
-        app.command()(command)
 
 
 def _speed(text: str) -> float | None:

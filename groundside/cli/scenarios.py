@@ -1,15 +1,12 @@
-"""The command line ``ftcc``: scenarios, single-process flights and reports. Flights as processes are in `cli_fly`."""
+"""The commands that begin with a scenario and need no processes: list, check, simulate, verify."""
 
 from __future__ import annotations
 
-import warnings
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ftcc.groundside import cli_airframe, cli_fly, cli_ground, cli_study, cli_view
-from ftcc.groundside.cli_common import (
+from ftcc.groundside.cli.common import (
     Duration,
     Form,
     Out,
@@ -17,7 +14,6 @@ from ftcc.groundside.cli_common import (
     Seed,
     Settings,
     Variants,
-    fail,
     load_mission,
     load_scenario,
     new_run_folder,
@@ -25,21 +21,10 @@ from ftcc.groundside.cli_common import (
     terminal,
     warn,
 )
-from ftcc.groundside.errors import UserError
 
-__all__ = ["app", "main"]
-
-app = typer.Typer(
-    name="ftcc",
-    help="Software in the loop for swarms of fixed-wing UAVs under fault-tolerant cooperative control.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+__all__ = ["check", "list_all", "simulate", "verify"]
 
 
-@app.command("list")
 def list_all() -> None:
     """List schemes and shipped scenarios with their forms and variants."""
     from rich.table import Table
@@ -74,7 +59,6 @@ def list_all() -> None:
     out.print(scenarios)
 
 
-@app.command()
 def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", settings: Settings = None) -> None:
     """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
     from ftcc.groundside.cases import cases_of, load_case
@@ -104,7 +88,6 @@ def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", set
         warn(f"{first.name}{where}: {text}")
 
 
-@app.command()
 def simulate(
     scenario: ScenarioName,
     form: Form = None,
@@ -139,7 +122,6 @@ def simulate(
         raise typer.Exit(1)
 
 
-@app.command()
 def verify(
     scenario: ScenarioName,
     cases: Annotated[
@@ -165,95 +147,3 @@ def verify(
             out.print(claims_table(shown))
     if failures:
         raise typer.Exit(1)
-
-
-@app.command()
-def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
-    json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON.")] = False,
-    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
-    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
-    page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
-) -> None:
-    """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
-    from ftcc.groundside.claims import failed
-    from ftcc.groundside.report import as_json, claims_of, show
-    from ftcc.groundside.report.report import write_report
-    from ftcc.groundside.run import NothingRecordedError, Run, RunError
-
-    recorded = Run(run)
-    written = terminal(stderr=True)
-    try:
-        results = claims_of(recorded)
-    except NothingRecordedError as error:
-        if json or csv or mat:
-            raise
-        warn(str(error))
-        if page:
-            written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
-        raise typer.Exit(1) from None
-    if json:
-        print(as_json(recorded, results))
-    else:
-        show(terminal(), recorded, results)
-    for option, file, export in (("--csv", csv, recorded.export_csv), ("--mat", mat, recorded.export_mat)):
-        if file is not None:
-            try:
-                export(file)
-            except OSError as error:
-                raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
-            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
-    if page and not json:
-        written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
-    if failed(results):
-        raise typer.Exit(1)
-
-
-@app.command()
-def compare(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of runs of one scheme.")],
-    out: Annotated[Path, typer.Option(help="Folder of the page and its figures.")] = Path("runs/compared"),
-) -> None:
-    """Lay runs over each other: the same figures with a colour per run, and one table of claims."""
-    from rich.table import Table
-    from rich.text import Text
-
-    from ftcc.groundside.report.comparison import Comparison
-    from ftcc.groundside.run import Run, RunError
-
-    if len(runs) < 2:
-        raise RunError("compare needs two runs or more")
-    comparison = Comparison([Run(path) for path in runs])
-    heads, rows = comparison.rows()
-    table = Table(header_style="bold", pad_edge=False)
-    for head in heads:
-        table.add_column(head.text, justify="right" if head.number else "left", overflow="fold")
-    styles = {"holds": "green", "fails": "bold red", "open": "dim"}
-    for row in rows:
-        table.add_row(*(Text(cell.text, styles.get(cell.mark, "")) for cell in row))
-    terminal().print(table)
-    try:
-        page = comparison.write(out)
-    except OSError as error:
-        raise RunError(f"--out {out}: cannot be written: {error.strerror or error}") from None
-    terminal(stderr=True).print(f"wrote {page}", highlight=False, soft_wrap=True)
-
-
-cli_airframe.register(app)
-cli_fly.register(app)
-cli_view.register(app)
-cli_ground.register(app)
-cli_study.register(app)
-
-
-def main() -> None:
-    """Entry point: bad input ends with one message and exit code 2."""
-    warnings.showwarning = lambda message, *_, **__: warn(str(message))
-    try:
-        app()
-    except UserError as error:
-        fail(str(error))
-
-
-if __name__ == "__main__":
-    main()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli_common import fail, terminal
+from ftcc.groundside.cli.common import fail, terminal
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -16,15 +16,10 @@ if TYPE_CHECKING:
     from ftcc.sim.modes import Mode
     from ftcc.sim.trim import Trim
 
-__all__ = ["register"]
+__all__ = ["airframe"]
 
 _COLUMNS_TO_CHOOSE = 6
 """More airspeeds than this do not fit side by side."""
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to ``app``."""
-    app.command()(airframe)
 
 
 def airframe(

@@ -11,12 +11,28 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli_common import fail, terminal, warn
+from ftcc.groundside.cli.common import fail, terminal, warn
 
 if TYPE_CHECKING:
     from ftcc.groundside.station import Station
 
-__all__ = ["register"]
+__all__ = [
+    "attitude",
+    "failures",
+    "fault",
+    "ftc",
+    "keys",
+    "leader",
+    "link",
+    "mode",
+    "param",
+    "pause",
+    "repair",
+    "resume",
+    "speed",
+    "step",
+    "vehicles",
+]
 
 _REFUSED = 1
 
@@ -26,17 +42,11 @@ Uav = Annotated[int, typer.Argument(metavar="UAV", help="Id of a UAV.")]
 Other = Annotated[int | None, typer.Argument(metavar="[UAV]", help="The other end; without: all links of the UAV.")]
 At = Annotated[float | None, typer.Option(help="Simulated time at which it acts, s; default: at once.")]
 
-link = typer.Typer(no_args_is_help=True, help="Cut, degrade and restore radio links.")
-param = typer.Typer(no_args_is_help=True, help="Parameters: gains by their names, channel, sizes of failures, rates.")
-keys = typer.Typer(no_args_is_help=True, help="Keys of signed links to the ground.")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to ``app``."""
-    for command in (vehicles, failures, fault, repair, leader, attitude, ftc, mode, pause, step, resume, speed):
-        app.command()(command)
-    for name, group in (("link", link), ("param", param), ("keys", keys)):
-        app.add_typer(group, name=name)
+link = typer.Typer(name="link", no_args_is_help=True, help="Cut, degrade and restore radio links.")
+param = typer.Typer(
+    name="param", no_args_is_help=True, help="Parameters: gains by their names, channel, sizes of failures, rates."
+)
+keys = typer.Typer(name="keys", no_args_is_help=True, help="Keys of signed links to the ground.")
 
 
 @contextmanager

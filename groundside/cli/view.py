@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
-from ftcc.groundside.cli_common import fail, terminal, warn
+from ftcc.groundside.cli.common import fail, terminal, warn
 
 if TYPE_CHECKING:
     from ftcc.groundside.dashboard import Dashboard
     from ftcc.groundside.run import Run
     from ftcc.groundside.snapshot import Event
 
-__all__ = ["register", "show_past"]
+__all__ = ["replay", "show_past", "watch"]
 
 Kind = Literal["web", "native"]
 
@@ -26,12 +26,6 @@ _PATIENCE = 20.0
 
 _Viewer = Annotated[str, typer.Option("--viewer", help="web or native.")]
 _Browser = Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to ``app``."""
-    for command in (watch, replay):
-        app.command()(command)
 
 
 def _kind(viewer: str) -> Kind:

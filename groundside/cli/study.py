@@ -8,17 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli_common import Duration, Form, Out, ScenarioName, Seed, Settings, Variants, fail, terminal
+from ftcc.groundside.cli.common import Duration, Form, Out, ScenarioName, Seed, Settings, Variants, fail, terminal
 
 if TYPE_CHECKING:
     from ftcc.groundside.study import Outcome
 
-__all__ = ["register"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to ``app``."""
-    app.command()(study)
+__all__ = ["study"]
 
 
 def study(

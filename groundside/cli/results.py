@@ -1,0 +1,82 @@
+"""The commands that look at what was recorded: report, compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ftcc.groundside.cli.common import terminal, warn
+
+__all__ = ["compare", "report"]
+
+
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
+    json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON.")] = False,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
+    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
+    page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
+) -> None:
+    """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
+    from ftcc.groundside.claims import failed
+    from ftcc.groundside.report import as_json, claims_of, show
+    from ftcc.groundside.report.report import write_report
+    from ftcc.groundside.run import NothingRecordedError, Run, RunError
+
+    recorded = Run(run)
+    written = terminal(stderr=True)
+    try:
+        results = claims_of(recorded)
+    except NothingRecordedError as error:
+        if json or csv or mat:
+            raise
+        warn(str(error))
+        if page:
+            written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+        raise typer.Exit(1) from None
+    if json:
+        print(as_json(recorded, results))
+    else:
+        show(terminal(), recorded, results)
+    for option, file, export in (("--csv", csv, recorded.export_csv), ("--mat", mat, recorded.export_mat)):
+        if file is not None:
+            try:
+                export(file)
+            except OSError as error:
+                raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
+            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    if page and not json:
+        written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+    if failed(results):
+        raise typer.Exit(1)
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of runs of one scheme.")],
+    out: Annotated[Path, typer.Option(help="Folder of the page and its figures.")] = Path("runs/compared"),
+) -> None:
+    """Lay runs over each other: the same figures with a colour per run, and one table of claims."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from ftcc.groundside.report.comparison import Comparison
+    from ftcc.groundside.run import Run, RunError
+
+    if len(runs) < 2:
+        raise RunError("compare needs two runs or more")
+    comparison = Comparison([Run(path) for path in runs])
+    heads, rows = comparison.rows()
+    table = Table(header_style="bold", pad_edge=False)
+    for head in heads:
+        table.add_column(head.text, justify="right" if head.number else "left", overflow="fold")
+    styles = {"holds": "green", "fails": "bold red", "open": "dim"}
+    for row in rows:
+        table.add_row(*(Text(cell.text, styles.get(cell.mark, "")) for cell in row))
+    terminal().print(table)
+    try:
+        page = comparison.write(out)
+    except OSError as error:
+        raise RunError(f"--out {out}: cannot be written: {error.strerror or error}") from None
+    terminal(stderr=True).print(f"wrote {page}", highlight=False, soft_wrap=True)
