@@ -13,6 +13,7 @@ from ftcc.link.compiled import compiled
 
 __all__ = [
     "attitude_drift",
+    "attitude_error",
     "body_rate_model",
     "deflections_for",
     "kinematics",
@@ -20,6 +21,12 @@ __all__ = [
     "largest_deflections",
     "least_deflections",
 ]
+
+
+@compiled
+def attitude_error(own, reference):
+    """X1 - X1d: the own tracking error of (7.12) and (8.10)."""
+    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
 
 
 @compiled

@@ -225,11 +225,11 @@ class Station(Conversation):
     def attitude(self, uav: int, *, bank: float, alpha: float, beta: float = 0.0) -> None:
         """Have a UAV of an attitude scheme fly another attitude (rad) with respect to its velocity, for good."""
         # It loads numba, which no other command needs.
-        from ftcc.airside.references.attitude import attitude
+        from ftcc.link.rotation import body_attitude
 
         place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
         gamma = math.atan2(-place.vz, math.hypot(place.vx, place.vy))
-        wanted = attitude(gamma, math.atan2(place.vy, place.vx), bank, alpha, beta)
+        wanted = body_attitude(math.atan2(place.vy, place.vx), gamma, bank, alpha, beta)
         ignored = (
             dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
             | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE

@@ -8,6 +8,7 @@ import numpy as np
 
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import NOISE, gaussian_pair, philox
+from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, P, Q, R, V, X, Y, Z
 
 __all__ = ["STATE_MESSAGE", "add_noise", "encode_state"]
@@ -40,29 +41,15 @@ def add_noise(true, deviation, seed, uav, tick, out):
 
 
 @compiled
-def _times(a0, a1, a2, a3, b0, b1, b2, b3):
-    """Product of two quaternions."""
-    return (
-        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-        a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
-        a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
-    )
-
-
-@compiled
 def encode_state(measured, out):
     """Turn ``measured`` (order of `TRUTH`) into the fields of `STATE_MESSAGE`, rounded to float32 as on the wire.
 
-    The attitude is the path frame (chi, gamma, mu) turned by sideslip and angle of attack; north-east-down.
+    Attitude as `body_attitude` has it; north-east-down.
     """
     cos_gamma = math.cos(measured[GAMMA])
-    q0, q1, q2, q3 = math.cos(0.5 * measured[CHI]), 0.0, 0.0, math.sin(0.5 * measured[CHI])
-    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[GAMMA]), 0.0, math.sin(0.5 * measured[GAMMA]), 0.0)
-    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[MU]), math.sin(0.5 * measured[MU]), 0.0, 0.0)
-    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[BETA]), 0.0, 0.0, -math.sin(0.5 * measured[BETA]))
-    q0, q1, q2, q3 = _times(q0, q1, q2, q3, math.cos(0.5 * measured[ALPHA]), 0.0, math.sin(0.5 * measured[ALPHA]), 0.0)
-    out[0], out[1], out[2], out[3] = q0, q1, q2, q3
+    out[0], out[1], out[2], out[3] = body_attitude(
+        measured[CHI], measured[GAMMA], measured[MU], measured[ALPHA], measured[BETA]
+    )
     out[4], out[5], out[6] = measured[P], measured[Q], measured[R]
     out[7], out[8], out[9] = measured[X], measured[Y], -measured[Z]
     out[10] = measured[V] * cos_gamma * math.cos(measured[CHI])

@@ -7,7 +7,7 @@ import math
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
 
-__all__ = ["EDGE", "bounded_transform", "performance_transform", "performance_tube"]
+__all__ = ["EDGE", "bounded_transform", "bounded_transforms", "performance_transform", "performance_tube"]
 
 EDGE = 0.98
 """The transform sees at most this share of the tube: beyond it, up to and outside of the wall, it stays finite."""
@@ -54,3 +54,12 @@ def bounded_transform(error, width, lower, upper, edge, continued):  # type: ign
     transformed = 0.5 * math.log((lower * upper + upper * share) / (lower * upper - lower * share))
     slope = (1.0 / (lower + share) + 1.0 / (upper - share)) / (2.0 * width)
     return transformed + continued * (wanted - share) * width * slope, slope
+
+
+@compiled
+def bounded_transforms(errors, width, lower, upper, edge, continued):  # type: ignore[no-untyped-def]
+    """`bounded_transform` of three axes in one tube: the three transformed errors, the three slopes."""
+    first, first_slope = bounded_transform(errors[0], width, lower, upper, edge, continued)
+    second, second_slope = bounded_transform(errors[1], width, lower, upper, edge, continued)
+    third, third_slope = bounded_transform(errors[2], width, lower, upper, edge, continued)
+    return (first, second, third), (first_slope, second_slope, third_slope)

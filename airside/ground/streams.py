@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.ground.seat import Seat
-from ftcc.airside.references.attitude import attitude
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
 from ftcc.link.mavlink import dialect, float_array
 from ftcc.link.modes import custom_mode
+from ftcc.link.rotation import body_attitude
 
 __all__ = ["LINK_FIELDS", "ON_REQUEST", "STREAMS", "Schedule", "Stream", "heartbeat", "rates_of", "requested"]
 
@@ -180,7 +180,7 @@ def _attitude_target(seat: Seat) -> Any:
         mu, alpha, beta = seat.autopilots.reference[seat.i, :3].tolist()
         rates = 0b111
         return _M.MAVLink_attitude_target_message(
-            _stamp(seat), rates, attitude(own.gamma, own.chi, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
+            _stamp(seat), rates, body_attitude(own.chi, own.gamma, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
         )
     pitch = own.theta if seat.leader else _signal(seat, "theta_d")
     rate = 0.0 if seat.leader else _signal(seat, "q_d")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from ftcc.airside.flight_path import Own, decode_state
 from ftcc.link.compiled import compiled, fields
 from ftcc.link.mavlink import dialect
 
-__all__ = ["Command", "Filter", "Reference", "attitude", "command_from_ground", "refer", "stand"]
+__all__ = ["Command", "Filter", "Reference", "command_from_ground", "refer", "stand"]
 
 
 class Reference(NamedTuple):
@@ -86,25 +85,6 @@ _BANK, _ALPHA, _BETA = 1.05, (-0.15, 0.26), 0.26
 """Targets that are taken, rad: a bank of 60 deg, an angle of attack short of the stall, 15 deg of sideslip (chosen)."""
 _UNIT = 0.01
 """By how much the length of a quaternion may differ from 1."""
-
-
-def attitude(gamma: float, chi: float, mu: float, alpha: float, beta: float) -> tuple[float, float, float, float]:
-    """Quaternion body to north-east-down of an attitude (rad) with respect to the flight path: of `decode_state`."""
-    q = (math.cos(0.5 * chi), 0.0, 0.0, math.sin(0.5 * chi))
-    for axis, angle in ((2, gamma), (1, mu), (3, -beta), (2, alpha)):
-        turn = [math.cos(0.5 * angle), 0.0, 0.0, 0.0]
-        turn[axis] = math.sin(0.5 * angle)
-        q = _product(q, turn)
-    return q
-
-
-def _product(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
 
 
 def command_from_ground(message: Any, own: NDArray[np.float64], now_us: int) -> tuple[Command | None, str]:

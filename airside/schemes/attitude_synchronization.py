@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.attitude_model import (
+    attitude_error,
     body_rate_model,
     deflections_for,
     kinematics,
@@ -44,7 +45,7 @@ from ftcc.airside.elements.neighbours import error_sums, filtered_error_sums
 from ftcc.airside.elements.networks import adaptation_rate, diagonal_energy, grid_axis_energy, learned_gain
 from ftcc.airside.elements.nonlinear import smooth_power
 from ftcc.airside.elements.observers import discrete_disturbance_observer_step
-from ftcc.airside.elements.performance import bounded_transform, performance_tube
+from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.vectors import (
     added,
     applied,
@@ -236,15 +237,10 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 @compiled
-def _tracking_error(own, reference):
-    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
-
-
-@compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: the published zeros, the body rates as measured, the surfaces at their command."""
     rates, deflections = (own.p, own.q, own.r), (own.aileron, own.elevator, own.rudder)
-    e = _tracking_error(own, reference)
+    e = attitude_error(own, reference)
     return State(
         t=own.t, began=own.t, ticks=0.0,
         e=e, e_dot=_ZERO, F1=_ZERO,
@@ -254,15 +250,6 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
         x2_hat=rates, d=_ZERO,
         neighbours=0.0,  # type: ignore[arg-type]
     )  # fmt: skip
-
-
-@compiled
-def _transformed(E, eps, gains):
-    """xi and eta of the three axes, eq. (7.20)."""
-    xi_mu, eta_mu = bounded_transform(E[0], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
-    xi_alpha, eta_alpha = bounded_transform(E[1], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
-    xi_beta, eta_beta = bounded_transform(E[2], eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
-    return (xi_mu, xi_alpha, xi_beta), (eta_mu, eta_alpha, eta_beta)
 
 
 @compiled
@@ -371,7 +358,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
 
     # Synchronization error (7.12) and funnel (7.16), (7.20).
-    e = _tracking_error(own, reference)
+    e = attitude_error(own, reference)
     if gains.neighbour_filter > 0.0:
         weights, differences, rates_sum = filtered_error_sums(
             e, heard, state.neighbours, gains.neighbour_filter, gains.oldest, dt
@@ -381,7 +368,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     phi_i = gains.lambda1 + gains.lambda2 * weights
     E = added(scaled(gains.lambda1, e), scaled(gains.lambda2, differences))
     eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.nu)
-    xi, eta = _transformed(E, eps, gains)
+    xi, eta = bounded_transforms(E, eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
 
     G1 = kinematics(own.alpha, beta)
     F20, G20 = body_rate_model(V, own.alpha, own.beta, x2, V, model)
@@ -480,7 +467,7 @@ def _low_passed(value, rate, target, w, h):
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """The own tracking error, and its rate as the difference to the tick before."""
-    e = _tracking_error(own, reference)
+    e = attitude_error(own, reference)
     since = own.t - state.t
     e_dot = scaled(1.0 / since, subtracted(e, state.e)) if since > 0.0 else _ZERO
     return e + e_dot

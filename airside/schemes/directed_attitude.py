@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.attitude_model import (
     attitude_drift,
+    attitude_error,
     body_rate_model,
     deflections_for,
     kinematics,
@@ -35,7 +36,7 @@ from ftcc.airside.conditions import positive, stable_in_steps
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
-from ftcc.airside.elements.performance import bounded_transform, performance_tube
+from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.saturation import vector_auxiliary_step
 from ftcc.airside.elements.vectors import (
     added,
@@ -195,11 +196,6 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 @compiled
-def _attitude_error(own, reference):
-    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
-
-
-@compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: predictions as measured, estimated disturbances 0, networks empty."""
     x1, x2 = (own.mu, own.alpha, own.beta), (own.p, own.q, own.r)
@@ -209,15 +205,6 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
         x2_d=_ZERO, mu1=_ZERO, mu2=_ZERO, u_f=_ZERO, u_f_dot=_ZERO, error_rate=_ZERO,
         W1=0.0, W2=0.0,  # type: ignore[arg-type]
     )  # fmt: skip
-
-
-@compiled
-def _transformed(e, eps, gains):
-    """E and eta of the three axes, eqs. (8.16), (8.17)."""
-    E_mu, eta_mu = bounded_transform(e[0], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
-    E_alpha, eta_alpha = bounded_transform(e[1], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
-    E_beta, eta_beta = bounded_transform(e[2], eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
-    return (E_mu, E_alpha, E_beta), (eta_mu, eta_alpha, eta_beta)
 
 
 @compiled
@@ -283,12 +270,12 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     weights_seen = _frobenius(state.W1), _frobenius(state.W2)
 
     # Synchronization error (8.10) in its bound (8.12).
-    error = _attitude_error(own, reference)
+    error = attitude_error(own, reference)
     weights, differences, rates_sum = error_sums(error, heard, gains.oldest)
     phi = gains.lambda1 + gains.lambda2 * weights
     e = added(scaled(gains.lambda1, error), scaled(gains.lambda2, differences))
     eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.iota)
-    E, eta = _transformed(e, eps, gains)
+    E, eta = bounded_transforms(e, eps, gains.k_lo, gains.k_up, gains.edge, 0.0)
     steep = times(eta, E)
 
     # Outer loop (8.22)-(8.28).
@@ -364,7 +351,7 @@ def _low_passed(value, rate, target, w, dt):
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """The own attitude error, and its rate as the predictor of the tick before had it."""
-    return _attitude_error(own, reference) + state.error_rate
+    return attitude_error(own, reference) + state.error_rate
 
 
 @compiled

@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from ftcc.link.rotation import quaternion_product
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 
@@ -30,16 +31,6 @@ _NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 """Rotation from north-east-down to east-north-up as a quaternion, scalar first."""
 
 
-def _times(a: Sequence[float], b: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """Product of two quaternions, scalar first."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
-
-
 class Poses:
     """Where an aircraft is drawn, and how it lies in the air there."""
 
@@ -49,7 +40,7 @@ class Poses:
     def of(self, place: Sequence[float] | NDArray[np.float64], truth: Mapping[str, float]) -> rr.Transform3D:
         """At ``place`` (east, north, up; m) with the attitude of true states by name; a missing one is 0."""
         encode_state(np.array([truth.get(field, 0.0) for field in TRUTH]), self._message)
-        w, x, y, z = _times(_NORTH_TO_WORLD, self._message[:4])
+        w, x, y, z = quaternion_product(*_NORTH_TO_WORLD, *self._message[:4])
         return rr.Transform3D(translation=place, quaternion=rr.Quaternion(xyzw=(x, y, z, w)))
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.references.attitude import Command, Filter, Reference, attitude, command_from_ground, refer
+from ftcc.airside.references.attitude import Command, Filter, Reference, command_from_ground, refer
 from ftcc.link.mavlink import dialect
+from ftcc.link.rotation import body_attitude
 
 STEP_US = 500
 
@@ -84,7 +85,7 @@ def asked(q: tuple[float, ...], mask: int = 0b111, gamma: float = 0.2, chi: floa
 
 @pytest.mark.parametrize("wanted", [(0.0, 0.05, 0.0), (0.5, 0.1, -0.1), (-1.0, -0.1, 0.2)])
 def test_a_target_from_the_ground_is_taken_apart_along_the_present_path(wanted: tuple[float, float, float]) -> None:
-    row, why = asked(attitude(0.2, -2.0, *wanted))
+    row, why = asked(body_attitude(-2.0, 0.2, *wanted))
     assert why == ""
     assert row == pytest.approx((2.5, *wanted))
 
@@ -92,8 +93,8 @@ def test_a_target_from_the_ground_is_taken_apart_along_the_present_path(wanted: 
 @pytest.mark.parametrize(
     ("q", "mask", "because"),
     [
-        (attitude(0.2, -2.0, 0.0, 0.35, 0.0), 0b111, "0, 20, 0 deg: outside the envelope"),
-        (attitude(0.2, -2.0, 1.2, 0.05, 0.0), 0b111, "69, 3, 0 deg: outside the envelope"),
+        (body_attitude(-2.0, 0.2, 0.0, 0.35, 0.0), 0b111, "0, 20, 0 deg: outside the envelope"),
+        (body_attitude(-2.0, 0.2, 1.2, 0.05, 0.0), 0b111, "69, 3, 0 deg: outside the envelope"),
         ((0.9, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),
         ((math.nan, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),
         ((0.0, 0.0, 0.0, 0.0), 0b111, "no unit quaternion"),

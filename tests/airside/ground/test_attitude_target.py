@@ -10,8 +10,9 @@ import pytest
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import level_deflections
-from ftcc.airside.references.attitude import attitude, command_from_ground
+from ftcc.airside.references.attitude import command_from_ground
 from ftcc.link.mavlink import dialect
+from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, V
 from ftcc.sim.sensors import encode_state
 from tests.swarm import AIRFRAME, autopilot
@@ -31,7 +32,7 @@ def test_the_attitude_on_the_wire_is_that_of_the_vehicles_messages():
     measured, message = np.zeros(len(TRUTH)), np.zeros(13)
     measured[[V, GAMMA, CHI, MU, ALPHA, BETA]] = 30.0, 0.1, -2.0, 0.3, 0.08, -0.05
     encode_state(measured, message)
-    assert attitude(0.1, -2.0, 0.3, 0.08, -0.05) == pytest.approx(message[:4].tolist(), abs=1e-6)
+    assert body_attitude(-2.0, 0.1, 0.3, 0.08, -0.05) == pytest.approx(message[:4].tolist(), abs=1e-6)
 
 
 def test_a_target_is_read_with_respect_to_the_present_flight_path():
@@ -39,14 +40,16 @@ def test_a_target_is_read_with_respect_to_the_present_flight_path():
     for gamma, chi, mu, alpha, beta in random.uniform(
         [-0.5, -3.1, -1.0, -0.1, -0.2], [0.5, 3.1, 1.0, 0.25, 0.2], (50, 5)
     ):
-        row, why = command_from_ground(target(attitude(gamma, chi, mu, alpha, beta)), flying(gamma, chi), 4_000_000)
+        row, why = command_from_ground(
+            target(body_attitude(chi, gamma, mu, alpha, beta)), flying(gamma, chi), 4_000_000
+        )
         assert why == ""
         assert row == pytest.approx((4.0, mu, alpha, beta), abs=1e-6)
 
 
 @pytest.mark.parametrize("mu_alpha_beta", [(1.2, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.2, 0.0), (0.0, 0.0, 0.3)])
 def test_beyond_the_envelope_a_target_is_refused(mu_alpha_beta):
-    row, why = command_from_ground(target(attitude(0.0, 0.0, *mu_alpha_beta)), flying(0.0, 0.0), 0)
+    row, why = command_from_ground(target(body_attitude(0.0, 0.0, *mu_alpha_beta)), flying(0.0, 0.0), 0)
     assert row is None
     assert "outside the envelope" in why
 

@@ -1,0 +1,30 @@
+"""Attitudes as quaternions, scalar first, as all sides read them from the messages."""
+
+from __future__ import annotations
+
+import math
+
+from ftcc.link.compiled import compiled
+
+__all__ = ["body_attitude", "quaternion_product"]
+
+
+@compiled
+def quaternion_product(a0, a1, a2, a3, b0, b1, b2, b3):
+    """The four components of a b."""
+    return (
+        a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
+        a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
+        a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
+        a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
+    )
+
+
+@compiled
+def body_attitude(chi, gamma, mu, alpha, beta):
+    """Body axes to north-east-down: the path frame (chi, gamma, mu) turned by sideslip and angle of attack; rad."""
+    q0, q1, q2, q3 = math.cos(0.5 * chi), 0.0, 0.0, math.sin(0.5 * chi)
+    q0, q1, q2, q3 = quaternion_product(q0, q1, q2, q3, math.cos(0.5 * gamma), 0.0, math.sin(0.5 * gamma), 0.0)
+    q0, q1, q2, q3 = quaternion_product(q0, q1, q2, q3, math.cos(0.5 * mu), math.sin(0.5 * mu), 0.0, 0.0)
+    q0, q1, q2, q3 = quaternion_product(q0, q1, q2, q3, math.cos(0.5 * beta), 0.0, 0.0, -math.sin(0.5 * beta))
+    return quaternion_product(q0, q1, q2, q3, math.cos(0.5 * alpha), 0.0, math.sin(0.5 * alpha), 0.0)
