@@ -18,8 +18,7 @@ from ftcc.airside.references.profiles import (
     trigger_rows,
 )
 from ftcc.groundside.checks import Findings
-from ftcc.groundside.schema import AirframeSheet, LeaderFields, Plan
-from ftcc.groundside.schema_fire import PointMassSheet
+from ftcc.groundside.schema import AirframeSheet, LeaderFields, Plan, PointMassSheet
 from ftcc.link.graph import Graph
 from ftcc.sim.airframe import Airframe
 from ftcc.sim.trim import TrimError, steady_climb

@@ -18,8 +18,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.schema import AirframeSheet, Plan, fields_of
-from ftcc.groundside.schema_fire import PointMassSheet
+from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet, fields_of
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
 

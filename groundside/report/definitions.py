@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.metrics import check_expression
-from ftcc.groundside.schema_base import Id, Strict
+from ftcc.groundside.schema import Id, Strict
 from ftcc.link.actuators import unit_of
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema_base import Id, NotNegative, Positive, Strict
+from ftcc.groundside.schema.base import Id, NotNegative, Positive, Strict
 
 __all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields", "WindFields"]
 

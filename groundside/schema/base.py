@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Id", "NotNegative", "Positive", "Probability", "Strict"]
+__all__ = ["Actuator", "Id", "NotNegative", "Positive", "Probability", "Strict"]
 
 Id = Annotated[int, Field(ge=1, le=200)]
 """MAVLink system id of a UAV."""
+Actuator = Literal["thrust", "elevator", "aileron", "rudder", "load_factor", "bank"]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]

@@ -1,0 +1,30 @@
+"""What may stand in a scenario and in an airframe sheet: every field with its unit and range.
+
+`scenario` reads the files and merges forms and variants; `mission` turns the result into what the processes are told.
+"""
+
+from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, RateLimits, Start
+from ftcc.groundside.schema.base import Id, Strict
+from ftcc.groundside.schema.fire import PointMassSheet
+from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
+from ftcc.groundside.schema.plan import Claim, Plan, fields_of
+from ftcc.groundside.schema.references import LeaderFields
+from ftcc.groundside.schema.world import FaultFields
+
+__all__ = [
+    "AirframeSheet",
+    "ChannelFields",
+    "Claim",
+    "Damping",
+    "FaultFields",
+    "Id",
+    "Lag",
+    "LeaderFields",
+    "LinkEventFields",
+    "Plan",
+    "PointMassSheet",
+    "RateLimits",
+    "Start",
+    "Strict",
+    "fields_of",
+]

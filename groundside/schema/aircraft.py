@@ -1,0 +1,171 @@
+"""What may stand in an airframe sheet, and in a scenario about its aircraft: limits, lags, guards, starts."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from ftcc.groundside.schema.base import Actuator, Id, NotNegative, Positive, Strict
+
+__all__ = ["AirframeSheet", "Damping", "Lag", "Plant", "RateLimits", "Start", "Starts"]
+
+
+class AirframeSheet(Strict):
+    """An airframe's coefficients (SI units, rad); the names are those of the monograph's (2.1)-(2.7)."""
+
+    title: str = ""
+    m: Positive
+    g: Positive
+    rho: Positive
+    S: Positive
+    c: Positive
+    b: Positive
+    Ix: Positive
+    Iy: Positive
+    Iz: Positive
+    Ixz: float
+    T_max: Positive
+    CL0: float
+    CLa: Positive
+    CLde: float
+    CD0: NotNegative
+    CDa: float
+    CDa2: float
+    Cm0: float
+    Cma: float
+    Cmde: float
+    Cmq: float
+    CY0: float
+    CYb: float
+    Cl0: float
+    Clb: float
+    Clda: float
+    Cldr: float
+    Clp: float
+    Clr: float
+    Cn0: float
+    Cnb: float
+    Cnda: float
+    Cndr: float
+    Cnp: float
+    Cnr: float
+
+
+class Lag(Strict):
+    """First-order lag of each actuator, rad/s; 0 = none."""
+
+    thrust: float = Field(0.0, ge=0.0)
+    elevator: float = Field(0.0, ge=0.0)
+    aileron: float = Field(0.0, ge=0.0)
+    rudder: float = Field(0.0, ge=0.0)
+    load_factor: float = Field(0.0, ge=0.0)
+    bank: float = Field(0.0, ge=0.0)
+
+
+class RateLimits(Strict):
+    """Fastest motion of each actuator, N/s, rad/s and 1/s; inf, the default: no limit."""
+
+    model_config = ConfigDict(allow_inf_nan=True)
+
+    thrust: Positive = math.inf
+    elevator: Positive = math.inf
+    aileron: Positive = math.inf
+    rudder: Positive = math.inf
+    load_factor: Positive = math.inf
+    bank: Positive = math.inf
+
+
+class Damping(Strict):
+    """Of actuators of second order, whose ``lag`` is their natural frequency; 0: first order."""
+
+    thrust: float = Field(0.0, ge=0.0, lt=1.0)
+    elevator: float = Field(0.0, ge=0.0, lt=1.0)
+    aileron: float = Field(0.0, ge=0.0, lt=1.0)
+    rudder: float = Field(0.0, ge=0.0, lt=1.0)
+    load_factor: float = Field(0.0, ge=0.0, lt=1.0)
+    bank: float = Field(0.0, ge=0.0, lt=1.0)
+
+
+class Limits(Strict):
+    """Travel of each actuator: [lowest, highest], N, rad, and load factor."""
+
+    thrust: tuple[float, float] | None = None
+    elevator: tuple[float, float] | None = None
+    aileron: tuple[float, float] | None = None
+    rudder: tuple[float, float] | None = None
+    load_factor: tuple[float, float] | None = None
+    bank: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for name in type(self).model_fields:
+            pair = getattr(self, name)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{name} = {list(pair)}: the lower limit must be below the upper one")
+        return self
+
+
+class Guards(Strict):
+    """Where the model ends: beyond these an aircraft counts as lost."""
+
+    least_airspeed: float = Field(3.0, gt=0.0, description="m/s")
+    flight_path_angle: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
+    angle_of_attack: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
+    sideslip: float = Field(1.4, gt=0.0, lt=1.5708, description="rad")
+
+
+class AutothrottleFields(Strict):
+    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V)."""
+
+    airspeed: float = Field(gt=0.0, description="m/s")
+    gain: float = Field(gt=0.0, description="N per m/s")
+    thrust: float = Field(ge=0.0, description="N")
+
+
+class Plant(Strict):
+    """Options of the true aircraft."""
+
+    model: str | None = Field(None, description="which plant flies; default: the one that the scheme is made for")
+    coefficients: dict[str, float] = Field(
+        {}, description="factors of the true aircraft's aerodynamic coefficients, of which laws know nothing, by name"
+    )
+    elevator_lift: bool = Field(True, description="false: CLde = 0")
+    lag: Lag = Lag()
+    damping: Damping = Damping()
+    delay: int = Field(0, ge=0, le=10, description="samples by which a command acts later than it has to")
+    limits: Limits
+    rate_limits: RateLimits = RateLimits()
+    autothrottle: AutothrottleFields | None = None
+    fault: Literal["after_lag", "before_lag"] = "after_lag"
+    initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
+        "trim",
+        description="position, and command in force before the first one has come through; N, rad. With trim and a "
+        "delay the first command counts as all that came before it",
+    )
+    guards: Guards = Guards()
+
+
+class Start(Strict):
+    """State at t = 0."""
+
+    V: float | None = Field(None, gt=0.0, description="m/s, airspeed")
+    x: float | None = Field(None, description="m, forward position")
+    y: float | None = Field(None, description="m, lateral position; constant in the vertical plane")
+    z: float | None = Field(None, description="m, altitude")
+    gamma: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, flight-path angle")
+    theta: float | Literal["trim"] | None = Field(None, description="rad, pitch angle")
+    q: float | None = Field(None, description="rad/s, pitch rate")
+    chi: float | None = Field(None, description="rad, course")
+    mu: float | None = Field(None, description="rad, bank about the velocity")
+    alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
+    beta: float | None = Field(None, gt=-1.4, lt=1.4, description="rad, sideslip")
+    p: float | None = Field(None, description="rad/s, roll rate")
+    r: float | None = Field(None, description="rad/s, yaw rate")
+
+
+class Starts(Start):
+    """State of the followers at t = 0, and where single UAVs differ."""
+
+    uav: dict[Id, Start] = {}

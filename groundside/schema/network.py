@@ -1,0 +1,91 @@
+"""What may stand in a scenario about who hears whom: graph, channel, and what happens to links."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ftcc.groundside.schema.base import Id, Probability, Strict
+
+__all__ = ["ChannelFields", "EdgeFields", "GraphFields", "LinkEventFields"]
+
+
+class EdgeFields(Strict):
+    """An edge of the communication graph: ``between`` two UAVs (both ways), or ``from`` a sender ``to`` a receiver."""
+
+    between: tuple[int, int] | None = None
+    sender: int | None = Field(None, alias="from")
+    receiver: int | None = Field(None, alias="to")
+    weight: float = Field(gt=0.0, description="a_ij of the monograph")
+
+    @model_validator(mode="after")
+    def _one_way_of_saying(self) -> Self:
+        both = self.between is not None
+        directed = (self.sender is not None, self.receiver is not None)
+        if both == any(directed) or any(directed) != all(directed):
+            raise ValueError("needs either between = [a, b], or from = a and to = b")
+        return self
+
+    @property
+    def directed(self) -> list[tuple[int, int]]:
+        """Pairs (receiver, sender)."""
+        if self.between is not None:
+            a, b = self.between
+            return [(a, b), (b, a)]
+        assert self.receiver is not None
+        assert self.sender is not None
+        return [(self.receiver, self.sender)]
+
+
+class GraphFields(Strict):
+    """The communication graph."""
+
+    edges: list[EdgeFields] = []
+
+
+class ChannelFields(Strict):
+    """Quality of the radio links."""
+
+    loss: Probability = Field(0.0, description="probability of loss of a record, independent")
+    burst_start: Probability = Field(0.0, description="probability per record of entering a burst")
+    burst_end: Probability = Field(1.0, description="probability per record of leaving it")
+    burst_loss: Probability = Field(1.0, description="probability of loss within a burst")
+    delay: float = Field(0.0, ge=0.0, description="s, beyond the link latency")
+    jitter: float = Field(0.0, ge=0.0, description="s, further delay, uniform in [0, jitter]")
+
+
+class LinkEventFields(Strict):
+    """A change of the radio of one UAV, or of one edge, from ``at`` to ``until``."""
+
+    at: float = Field(ge=0.0, description="s")
+    until: float | None = Field(None, description="s; without it the change is for good")
+    kind: Literal["cut", "degrade"]
+    uav: Id | None = None
+    edge: tuple[Id, Id] | None = Field(None, description="[sender, receiver]")
+    directed: bool = Field(False, description="only sender -> receiver")
+    loss: Probability | None = None
+    burst_start: Probability | None = None
+    burst_end: Probability | None = None
+    burst_loss: Probability | None = None
+    delay: float | None = Field(None, ge=0.0, description="s")
+    jitter: float | None = Field(None, ge=0.0, description="s")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.uav is None) == (self.edge is None):
+            raise ValueError("needs either uav = n or edge = [sender, receiver]")
+        if self.until is not None and self.until <= self.at:
+            raise ValueError(f"until = {self.until:g} must be later than at = {self.at:g}")
+        if self.directed and self.edge is None:
+            raise ValueError("directed goes with edge")
+        if bool(self.changes) != (self.kind == "degrade"):
+            allowed = ", ".join(ChannelFields.model_fields)
+            raise ValueError(f'kind = "degrade" needs, and only it takes, some of {allowed}')
+        return self
+
+    @property
+    def changes(self) -> dict[str, float]:
+        """The channel parameters that are given."""
+        given = {name: getattr(self, name) for name in ChannelFields.model_fields}
+        return {name: value for name, value in given.items() if value is not None}

@@ -1,0 +1,128 @@
+"""What may stand in a scenario: everything together, and the claims that its flight must meet."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ftcc.groundside.schema.aircraft import Plant, Starts
+from ftcc.groundside.schema.base import Id, Strict
+from ftcc.groundside.schema.fire import FireEventFields, FireFields, WindFields
+from ftcc.groundside.schema.network import ChannelFields, GraphFields, LinkEventFields
+from ftcc.groundside.schema.references import AttitudeFields, LeaderFields
+from ftcc.groundside.schema.world import DisturbanceFields, FaultFields, HomeFields, NoiseFields, ObstacleFields
+
+__all__ = ["Claim", "Plan", "fields_of"]
+
+
+class Uavs(Strict):
+    """Who flies: ids, leaders after followers."""
+
+    followers: list[Id] = Field(min_length=1)
+    leaders: list[Id] = []
+
+
+class Rates(Strict):
+    """The time grid. Ideal exchange (form "monograph") has no exchange period and no latency of its own."""
+
+    control_rate: float = Field(gt=0.0, le=2000.0, description="Hz")
+    exchange_rate: float | None = Field(None, gt=0.0, le=2000.0, description="Hz, records to the neighbours")
+    latency: float | None = Field(None, ge=0.0, description="s, link latency; default: one exchange period")
+    plant_step: float = Field(0.001, gt=0.0, le=0.01, description="s, integration step of the plant")
+
+
+class GainFields(BaseModel):
+    """Gains of the scheme by name, and where single UAVs differ."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, float]
+
+    uav: dict[Id, dict[str, float]] = {}
+
+    @property
+    def common(self) -> dict[str, float]:
+        """Those of all UAVs, as far as the file gives them."""
+        return dict(self.__pydantic_extra__)
+
+
+class MissionFields(Strict):
+    """What every follower knows without being told."""
+
+    V: float = Field(gt=0.0, description="m/s, the mission's speed")
+
+
+class Claim(Strict):
+    """A number that a flight must show. ``expected`` is keyed by case; a case that is not listed has no such claim."""
+
+    name: str
+    metric: str
+    signal: str = Field(description="arithmetic expression over columns of the recording")
+    uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
+    window: tuple[float, float] = Field(description="s, both ends included")
+    within: list[tuple[float, float]] = Field([], description="s, parts of the window that alone count; default: all")
+    threshold: float | dict[str, float] | None = Field(None, description="for the metrics that need one; by case")
+    unit: str = ""
+    source: str
+    expected: dict[str, float | list[float]]
+    tolerance: str | dict[str, str] = Field(
+        description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; by case'
+    )
+
+    @model_validator(mode="after")
+    def _window_in_order(self) -> Self:
+        if self.window[1] < self.window[0]:
+            raise ValueError(f"window = {list(self.window)}: must not end before it begins")
+        for part in self.within:
+            if not self.window[0] <= part[0] <= part[1] <= self.window[1]:
+                raise ValueError(f"within = {list(part)}: must be a part of window = {list(self.window)}")
+        return self
+
+
+class Flown(Strict):
+    """How a scenario that a run recorded came about."""
+
+    name: str
+    form: str
+    variants: list[str] = []
+    settings: list[str] = []
+    versions: dict[str, str] = {}
+
+
+class Plan(Strict):
+    """A scenario after its form, variants and settings have been merged."""
+
+    title: str
+    scheme: str
+    airframe: str = "reference_25kg"
+    duration: float = Field(gt=0.0, le=1e5, description="s")
+    seed: int = Field(1, ge=0, lt=2**63)
+    record_rate: float = Field(100.0, gt=0.0, le=2000.0, description="Hz")
+    uavs: Uavs
+    rates: Rates
+    graph: GraphFields
+    channel: ChannelFields = ChannelFields()
+    plant: Plant
+    start: Starts
+    mission: MissionFields | None = None
+    attitude: AttitudeFields | None = None
+    fire: FireFields | None = None
+    fire_events: list[FireEventFields] = []
+    wind: WindFields | None = None
+    leaders: dict[Id, LeaderFields] = {}
+    obstacles: list[ObstacleFields] = []
+    detection_range: float | None = Field(None, gt=0.0, description="m, at which the leaders detect an obstacle ahead")
+    gains: GainFields = GainFields()
+    switches: dict[str, bool] = {}
+    disturbances: list[DisturbanceFields] = []
+    faults: list[FaultFields] = []
+    link_events: list[LinkEventFields] = []
+    noise: NoiseFields = NoiseFields()
+    home: HomeFields = HomeFields()
+    claims: list[Claim] = []
+    flown: Flown | None = None
+
+
+def fields_of(model: Any) -> list[str]:
+    """Names of the fields of a model as they stand in a file."""
+    return [field.alias or name for name, field in model.model_fields.items()]

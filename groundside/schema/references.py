@@ -1,0 +1,96 @@
+"""What may stand in a scenario about where to fly: leaders and their profiles, attitudes."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from ftcc.groundside.schema.base import Id, Strict
+
+__all__ = ["AttitudeFields", "LeaderFields"]
+
+
+class Filter(Strict):
+    """Second-order filter."""
+
+    frequency: float = Field(gt=0.0, description="rad/s")
+    damping: float = Field(gt=0.0)
+
+
+class CommandFields(Strict):
+    """From ``at`` on, or once leader ``uav`` has passed ``x``: another altitude, another speed."""
+
+    at: float | None = Field(None, ge=0.0, description="s")
+    uav: Id | None = None
+    x: float | None = Field(None, description="m, forward position")
+    altitude: float | None = Field(None, description="m; default: as before")
+    speed: float | None = Field(None, gt=0.0, description="m/s; default: as before")
+
+    @model_validator(mode="after")
+    def _by_time_or_position(self) -> Self:
+        if (self.at is None) == (self.x is None):
+            raise ValueError("needs either at = seconds, or x = position (and uav = the leader that passes it)")
+        return self
+
+
+class CosineFields(Strict):
+    """amplitude (cos(frequency (t - at)) - 1) added to the altitude from ``at`` on."""
+
+    at: float = Field(ge=0.0, description="s")
+    amplitude: float = Field(description="m")
+    frequency: float = Field(gt=0.0, description="rad/s")
+
+
+class WaveFields(Strict):
+    """amplitude sin(frequency t) added to the speed."""
+
+    amplitude: float = Field(description="m/s")
+    frequency: float = Field(gt=0.0, description="rad/s")
+
+
+class LeaderFields(Strict):
+    """A leader's commanded motion."""
+
+    x: float = Field(0.0, description="m, forward position at the start")
+    y: float = Field(0.0, description="m, lateral position")
+    z: float = Field(description="m, altitude at the start")
+    V: float = Field(gt=0.0, description="m/s, speed at the start")
+    commands: list[CommandFields] = []
+    altitude_filter: Filter = Filter(frequency=0.05, damping=0.9)
+    speed_filter: Filter = Filter(frequency=0.05, damping=0.95)
+    cosine: CosineFields | None = None
+    speed_wave: WaveFields | None = None
+    over_obstacles: list[float] = Field(
+        [],
+        description="m, altitude at which to pass each obstacle, from its detection until all leaders are past it; "
+        "elsewhere that of the start",
+    )
+    forward: bool = Field(False, description="speeds are forward speeds instead of airspeeds")
+    climb_limit: float | None = Field(
+        None, gt=0.0, description="m/s, largest climb rate of the profile; default: what the followers can follow"
+    )
+    sink_limit: float | None = Field(None, gt=0.0, description="m/s, largest sink rate; default likewise")
+
+
+class AttitudeCommandFields(Strict):
+    """From ``at`` on: another commanded attitude with respect to the velocity; what is not given stays."""
+
+    at: float = Field(ge=0.0, description="s")
+    bank: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
+    alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
+    sideslip: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
+    uavs: list[Id] | None = Field(None, min_length=1, description="default: all followers")
+
+    @model_validator(mode="after")
+    def _commands_something(self) -> Self:
+        if self.bank is None and self.alpha is None and self.sideslip is None:
+            raise ValueError("needs some of bank, alpha, sideslip")
+        return self
+
+
+class AttitudeFields(Strict):
+    """The attitude that each UAV refers to by itself: commands through a second-order filter."""
+
+    filter: Filter = Filter(frequency=0.9, damping=0.3)
+    commands: list[AttitudeCommandFields] = Field(min_length=1)

@@ -1,0 +1,116 @@
+"""What may stand in a scenario about what surrounds and befalls aircraft: obstacles, disturbances, faults, noise."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ftcc.groundside.schema.base import Actuator, Id, Probability, Strict
+
+__all__ = ["DisturbanceFields", "FaultFields", "HomeFields", "NoiseFields", "ObstacleFields"]
+
+
+class ObstacleFields(Strict):
+    """A zone along the flight that is to be passed above."""
+
+    x: tuple[float, float] = Field(description="m, from and to this forward position")
+    top: float = Field(description="m, altitude")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.x[0] < self.x[1]:
+            raise ValueError(f"x = {list(self.x)}: must end behind where it begins")
+        return self
+
+
+class DisturbanceFields(Strict):
+    """Constant disturbances from ``at`` on, as far as the plant has them."""
+
+    at: float = Field(ge=0.0, description="s")
+    d1: float = Field(0.0, description="m/s^2, of the airspeed")
+    d2: float = Field(0.0, description="rad/s, of the flight-path angle")
+    d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
+    b_x: float = Field(0.0, description="m/s^2, north")
+    b_y: float = Field(0.0, description="m/s^2, east")
+    b_z: float = Field(0.0, description="m/s^2, up")
+    onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
+    uavs: list[Id] | None = Field(None, description="default: all followers")
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The disturbances that are not zero, by name."""
+        given = {name: getattr(self, name) for name in type(self).model_fields if name not in ("at", "onset", "uavs")}
+        return {name: value for name, value in given.items() if value != 0.0}
+
+
+class FaultFields(Strict):
+    """From ``at`` on an ``actuator``, or the ``navigation`` solution, fails, until another fault of it.
+
+    Actuators: wrong: effectiveness * position + bias; off: effectiveness 0; stuck: holds its deflection; slow: moves at
+    ``slew`` at most; intermittent: healthy for a share of each period, else as wrong. Navigation: wrong: with an
+    offset; off: dead reckoning, or attitude held and rates zero; stuck: held; slow: fresh once in a period;
+    intermittent: fresh for a share of each period. ok: repaired.
+    """
+
+    at: float = Field(ge=0.0, description="s")
+    uav: Id
+    actuator: Actuator | None = None
+    navigation: Literal["position", "attitude"] | None = None
+    kind: Literal["wrong", "off", "stuck", "slow", "intermittent", "ok"] = "wrong"
+    effectiveness: Probability = 1.0
+    bias: float = Field(0.0, description="rad or N")
+    effectiveness_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
+    bias_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
+    slew: float | None = Field(None, gt=0.0, description="rad/s or N/s, largest rate of a slow actuator")
+    period: float | None = Field(None, gt=0.0, description="s, of intermittent faults and of slow navigation")
+    duty: Probability | None = Field(None, description="healthy share of the period")
+    offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m; roll, pitch, yaw, rad")
+    rate_offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m/s; p, q, r, rad/s")
+    without_trim: bool = Field(False, description="true: fly it although it leaves no level trim")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.actuator is None) == (self.navigation is None):
+            raise ValueError("needs either actuator or navigation")
+        given = self.model_fields_set
+        needed = {
+            "slow": {"slew"} if self.actuator else {"period"},
+            "intermittent": {"period", "duty"},
+        }.get(self.kind, set())
+        if needed - given:
+            raise ValueError(f"kind = {self.kind!r} needs {', '.join(sorted(needed - given))}")
+        lossy = {"effectiveness", "bias", "effectiveness_onset", "bias_onset"}
+        sizes = {"wrong": lossy, "intermittent": lossy} if self.actuator else {"wrong": {"offset", "rate_offset"}}
+        always = {"at", "uav", "actuator", "navigation", "kind", "without_trim"}
+        extra = given - always - needed - sizes.get(self.kind, set())
+        if extra:
+            raise ValueError(f"kind = {self.kind!r} takes no {', '.join(sorted(extra))}")
+        return self
+
+
+class HomeFields(Strict):
+    """Where on earth the origin of the local frame lies, for the maps of ground stations."""
+
+    latitude: float = Field(47.3977, ge=-85.0, le=85.0, description="deg")
+    longitude: float = Field(8.5456, ge=-180.0, le=180.0, description="deg")
+    altitude: float = Field(0.0, ge=-500.0, le=9000.0, description="m above mean sea level at z = 0")
+
+
+class NoiseFields(Strict):
+    """White measurement noise: standard deviation of each channel at every sample."""
+
+    factor: float = Field(1.0, ge=0.0, description="multiplies all of them")
+    x: float = Field(0.0, ge=0.0, description="m")
+    y: float = Field(0.0, ge=0.0, description="m")
+    z: float = Field(0.0, ge=0.0, description="m")
+    V: float = Field(0.0, ge=0.0, description="m/s")
+    gamma: float = Field(0.0, ge=0.0, description="rad")
+    chi: float = Field(0.0, ge=0.0, description="rad")
+    mu: float = Field(0.0, ge=0.0, description="rad")
+    alpha: float = Field(0.0, ge=0.0, description="rad; in the vertical plane either this or theta")
+    beta: float = Field(0.0, ge=0.0, description="rad")
+    theta: float = Field(0.0, ge=0.0, description="rad")
+    p: float = Field(0.0, ge=0.0, description="rad/s")
+    q: float = Field(0.0, ge=0.0, description="rad/s")
+    r: float = Field(0.0, ge=0.0, description="rad/s")
