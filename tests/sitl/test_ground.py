@@ -29,9 +29,9 @@ def runtime(environment: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("FTCC_RUNTIME_DIR", environment["FTCC_RUNTIME_DIR"])
 
 
-def held(fly: Callable[..., Flight], *arguments: str) -> Flight:
+def held(fly: Callable[..., Flight], *arguments: str, scenario: str = "containment") -> Flight:
     """A swarm in lockstep before its first tick."""
-    flight = fly("containment", "--speed", "max", "--hold", "--pack", "3", "--mavlink", "none", *arguments)
+    flight = fly(scenario, "--speed", "max", "--hold", "--pack", "3", "--mavlink", "none", *arguments)
     flight.wait_until(lambda: "held at t = 0" in flight.output)
     return flight
 
@@ -67,6 +67,26 @@ def test_the_same_failures_planned_and_commanded_are_the_same_flight_bit_for_bit
     acts = [event for event in events(flight.folder) if event.get("outcome") == "acts"]
     assert [(event["t"], event["uav"]) for event in acts if event["uav"] == 1] == [(2.0, 1)]
     assert {event["who"] for event in acts} == {"254/190"}
+
+
+def test_a_fire_that_moves_as_planned_and_as_commanded_is_the_same_flight_bit_for_bit(
+    fly: Callable[..., Flight], ftcc: Ftcc
+) -> None:
+    at, north, east, drift = 4.0, 620.0, -35.0, (0.5, -0.25)
+    flight = held(fly, "--duration", "8", scenario="fire_monitoring")
+    with Station() as station:
+        for uav in station.uavs:
+            station.set(uav, "FTCC_AT", 1e3 * at)
+            for name, value in (("NORTH", north), ("EAST", east), ("DRIFT_N", drift[0]), ("DRIFT_E", drift[1])):
+                station.set(uav, f"FIRE_{name}", value)
+    assert ftcc("resume").returncode == 0
+    assert flight.wait() == 0, flight.output
+    moves = f"fire_events=[{{at={at}, centre=[{north}, {east}], drift=[{drift[0]}, {drift[1]}]}}]"
+    for name, settings, same in (("planned", ("--set", moves), True), ("still", (), False)):
+        folder = flight.folder.with_name(name)
+        simulated = ftcc("simulate", "fire_monitoring", "--duration", "8", *settings, "--out", str(folder))
+        assert simulated.returncode == 0, simulated.stderr
+        assert same_flight(folder, flight.folder) == same
 
 
 def test_modes_pause_and_steps_in_one_flight(fly: Callable[..., Flight], ftcc: Ftcc) -> None:
