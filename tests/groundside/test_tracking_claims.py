@@ -22,6 +22,7 @@ PRESCRIBED = (
     "flight+loss_30",
     "flight+cut_uav1_20s",
     "flight+noise_z_2cm",
+    "flight+sixdof",
 )
 
 
