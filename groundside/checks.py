@@ -1,4 +1,4 @@
-"""What only the scenario as a whole can show: time grid, graph, travel, trim after faults, conditions on the gains."""
+"""What only the scenario as a whole can show: time grid, graph, travel, trim, conditions on the gains."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Start
-from ftcc.link.actuators import ACTUATORS, SLOT, unit_of
+from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
@@ -30,7 +30,6 @@ __all__ = [
     "Findings",
     "briefings",
     "check_delays",
-    "check_faults",
     "check_scheme",
     "gains_of",
     "graph_of",
@@ -378,63 +377,3 @@ def _motion(vehicle: VehicleSpec) -> Reference:
     speed, gamma = float(true[V]), float(true[GAMMA])
     climb, forward = speed * math.sin(gamma), speed * math.cos(gamma)
     return Reference(x=float(true[X]), V=speed, V_dot=0.0, z=float(true[Z]), z_dot=climb, z_ddot=0.0, x_dot=forward)
-
-
-def _speed(plan: Plan, uav: int) -> float:
-    """The airspeed at which a UAV must be able to fly level: the mission's, or that of its start."""
-    if plan.mission is not None:
-        return plan.mission.V
-    own = plan.start.uav.get(uav, plan.start)
-    return own.V or plan.start.V or math.nan
-
-
-def _commanded_speeds(profiles: dict[int, Profile], at: float) -> set[float]:
-    """The speeds that the leaders are commanded to at ``at`` (s); none if they never change."""
-    if len({speed for p in profiles.values() for speed in (p.V, *(command.speed for command in p.commands))}) < 2:
-        return set()
-    return {[p.V, *(command.speed for command in p.commands if command.at <= at)][-1] for p in profiles.values()}
-
-
-def check_faults(
-    plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
-) -> None:
-    """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel.
-
-    At the mission's speed, or every speed that leaders are commanded to while it lasts if they change theirs; under the
-    disturbances that act then.
-    """
-    changes = {command.at for p in profiles.values() for command in p.commands}
-    by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
-    for n, fault in enumerate(plan.faults):
-        if fault.actuator is None or fault.kind not in ("wrong", "off"):
-            continue
-        remaining = 0.0 if fault.kind == "off" else fault.effectiveness
-        vehicle = by_uav[fault.uav]
-        own = _speed(plan, fault.uav)
-        later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
-        end = min(later, default=math.inf)
-        low, high = vehicle.limits[SLOT[fault.actuator]]
-        times = changes | {disturbance.time for disturbance in vehicle.disturbances}
-        instants = sorted({fault.at} | {t for t in times if fault.at < t < min(end, plan.duration)})
-        for at, speed in [(t, v) for t in instants for v in sorted(_commanded_speeds(profiles, t) or {own})]:
-            acting = {
-                name: sum(d.value for d in vehicle.disturbances if d.channel == channel and d.time <= at)
-                for channel, (name, _) in enumerate(plant.DISTURBANCES)
-            }
-            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
-            needed = steady.get(fault.actuator, 0.0)
-            command = (needed - fault.bias) / remaining if remaining > 0.0 else math.inf
-            if low < command < high or (remaining == 0.0 and needed == fault.bias):
-                continue
-            unit = unit_of(fault.actuator)
-            text = (
-                f"faults.{n} (effectiveness {remaining:g}, bias {fault.bias:g} {unit}): leaves "
-                f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need "
-                f"the command ({needed:.3f} - {fault.bias:g})/{remaining:g} = {command:.3f} {unit}; "
-                f"allowed is {low:g} to {high:g}"
-            )
-            if fault.without_trim:
-                findings.warned.append(text)
-            else:
-                findings.refuse(f"{text} (without_trim = true flies it all the same)")
-            break

@@ -20,7 +20,6 @@ from ftcc.groundside.checks import (
     Findings,
     briefings,
     check_delays,
-    check_faults,
     check_scheme,
     gains_of,
     graph_of,
@@ -31,7 +30,7 @@ from ftcc.groundside.checks import (
     timing_of,
 )
 from ftcc.groundside.claims import check_claims
-from ftcc.groundside.faults import actuator_faults, fault_text, navigation_faults
+from ftcc.groundside.faults import actuator_faults, check_faults, fault_text, navigation_faults
 from ftcc.groundside.fire import check_posts
 from ftcc.groundside.leaders import check_clearance, limited, profiles_of
 from ftcc.groundside.links import link_changes, link_texts
