@@ -200,12 +200,10 @@ def _title(signal: Quantity) -> str:
     if not signal.meaning:
         return signal.name
     title = f"{signal.meaning[0].upper()}{signal.meaning[1:]} {signal.name}"
-    # What stands behind a comma tells of the several components which one it is, as the symbol does.
-    return (
-        title
-        if len(title) <= _LONGEST
-        else f"{title.partition(',')[0].removesuffix(signal.name).strip()} {signal.name}"
-    )
+    if len(title) > _LONGEST:
+        # What stands behind a comma tells which of several components it is, as the symbol does.
+        title = f"{title.partition(',')[0].removesuffix(signal.name).strip()} {signal.name}"
+    return title
 
 
 def uavs_of(panel: Panel, subject: Subject) -> Sequence[int]:

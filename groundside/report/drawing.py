@@ -173,7 +173,8 @@ def _draw_surroundings(axes: Axes, kind: str, flight: Flown) -> None:
     if fire is None or "fire_north" not in signals.names:
         return
     t, north, east = (signals.column(name, uav) for name in ("t", "fire_north", "fire_east"))
-    for k, style in ((0, "--"), (-1, "-")):
+    known = np.flatnonzero(np.isfinite(north)).tolist()
+    for k, style in zip((*known[:1], *known[-1:]), ("--", "-"), strict=False):
         here = Command(float(t[k]), float(north[k]), float(east[k]), 0.0, 0.0)
         x, y = border(fire, [here], float(t[k])).T
         axes.plot(y, x, style, color=hexadecimal(FIRE), linewidth=1.0, zorder=2)
