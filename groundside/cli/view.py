@@ -79,7 +79,10 @@ def watch(
 
 
 def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
-    """Draw what a swarm has flown so far, coarser the longer it is, and return the events that were told with it."""
+    """Draw what a swarm has flown so far, coarser the longer it is, and return the events that were told with it.
+
+    A viewer that does not keep up is spared the rest.
+    """
     from ftcc.groundside.replay import snapshots_of
     from ftcc.groundside.run import NothingRecordedError
 
@@ -89,6 +92,9 @@ def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
         for snapshot in snapshots_of(run, rate):
             dashboard.log(snapshot, patience=_PATIENCE)
             told += snapshot.events
+            if problems := dashboard.take_problems():
+                warn(problems[0].text)
+                break
     except NothingRecordedError:
         pass  # It has hardly started.
     return told

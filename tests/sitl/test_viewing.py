@@ -19,7 +19,7 @@ from ftcc.groundside.cli.view import show_past
 from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.viewer import viewer_program
 from ftcc.groundside.feed import watched
-from ftcc.groundside.snapshot import Snapshot
+from ftcc.groundside.snapshot import Event, Snapshot
 from tests import rrd
 from tests.sitl.conftest import Flight
 
@@ -153,6 +153,9 @@ def test_who_watches_late_sees_the_past_and_the_run_stays_whole(fly: Callable[..
     class Board:
         def log(self, snapshot: Snapshot, patience: float) -> None:
             drawn.append(snapshot)
+
+        def take_problems(self) -> tuple[Event, ...]:
+            return ()
 
     told = show_past(Run(flight.folder), cast(Dashboard, Board()))
     assert drawn[0].t == 0.0
