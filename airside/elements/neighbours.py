@@ -69,10 +69,10 @@ def weighted_average(heard, column, oldest, horizon):  # type: ignore[no-untyped
 
 
 @compiled
-def motion_sums(heard, column):  # type: ignore[no-untyped-def]
+def motion_sums(heard, column, carried):  # type: ignore[no-untyped-def]
     """sum_j a_ij, sum_j a_ij x_j at present and sum_j a_ij x_j', for x_j in ``column`` and its rate in the next one.
 
-    With them sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs.
+    With ``carried`` = 1 each x_j is carried to the present by its rate, with 0 it is held as it was sent. With them sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs.
     (6.22)-(6.23). A neighbour takes part from its first record on, however old.
 
     Returns
@@ -87,7 +87,7 @@ def motion_sums(heard, column):  # type: ignore[no-untyped-def]
             weight = heard.weight[j]
             rate = heard.values[j, column + 1]
             weights += weight
-            positions += weight * (heard.values[j, column] + rate * heard.age[j])
+            positions += weight * (heard.values[j, column] + carried * rate * heard.age[j])
             rates += weight * rate
     return weights, positions, rates
 

@@ -103,6 +103,9 @@ class Gains(NamedTuple):
     cap2: Annotated[float, Q("chi_max2", "-", "cap of chi21 .. chi32 (not in paper)", 2.0)]
     cap4: Annotated[float, Q("chi_max4", "-", "cap of chi41, chi42 (not in paper)", 1.0)]
     substeps: Annotated[float, Q("n_s", "-", "internal steps per tick", 1.0)]
+    extrapolation: Annotated[
+        float, Q("extrapolation", "-", "1: neighbours carried to the present, 0: held (not in paper)", 1.0)
+    ]
     growth: Annotated[float, Q("growth", "-", "1: neighbours move on within a tick (not in paper)", 0.0)]
     prediction: Annotated[float, Q("prediction", "-", "1: one-sample prediction (not in paper)", 0.0)]
 
@@ -348,8 +351,8 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         alpha += alpha - state.alpha_before
         q += q - state.q_before
     law = _evaluate(state, own, V, gamma, alpha, q, model, gains)
-    forward = motion_sums(heard, 0)
-    vertical = motion_sums(heard, 2)
+    forward = motion_sums(heard, 0, gains.extrapolation)
+    vertical = motion_sums(heard, 2, gains.extrapolation)
     learns_thrust = gains.adapt_thrust > 0.0
     learns_elevator = gains.adapt_elevator > 0.0 and not 0.0 < gains.adapt_until <= own.t
     if gains.guards > 0.0:

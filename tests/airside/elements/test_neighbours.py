@@ -66,7 +66,7 @@ def test_nobody_left_is_no_average():
 
 def test_motion_sums_give_the_disagreement_at_any_later_time():
     """(6.22) with neighbours that move on: e = D x - (N + t N_v), ev = D v - N_v; no horizon."""
-    weights, positions, rates = motion_sums(heard(), 0)
+    weights, positions, rates = motion_sums(heard(), 0, 1.0)
     for later in (0.0, 0.004):
         present = VALUES[:, 0] + VALUES[:, 1] * (AGE + later)
         assert weights * 12.0 - (positions + later * rates) == pytest.approx(float(WEIGHT @ (12.0 - present)))
@@ -74,8 +74,15 @@ def test_motion_sums_give_the_disagreement_at_any_later_time():
 
 
 def test_motion_sums_leave_out_who_was_never_heard():
-    assert motion_sums(heard((0.0, 0.0, 0.0)), 2) == (0.0, 0.0, 0.0)
-    assert motion_sums(heard((0.0, 1.0, 0.0)), 2) == pytest.approx((0.5, 105.0, 0.0))
+    assert motion_sums(heard((0.0, 0.0, 0.0)), 2, 1.0) == (0.0, 0.0, 0.0)
+    assert motion_sums(heard((0.0, 1.0, 0.0)), 2, 1.0) == pytest.approx((0.5, 105.0, 0.0))
+
+
+def test_motion_sums_of_held_neighbours_know_no_age():
+    """Reference table 8b: positions held."""
+    weights, positions, rates = motion_sums(heard(), 0, 0.0)
+    assert positions == pytest.approx(float(WEIGHT @ VALUES[:, 0]))
+    assert (weights, rates) == (motion_sums(heard(), 0, 1.0)[0], motion_sums(heard(), 0, 1.0)[2])
 
 
 ERRORS = np.array([[0.1, 0.2, 0.3, 1.0, 2.0, 3.0], [-0.1, 0.0, 0.1, 0.0, 1.0, -1.0], [0.4, 0.4, 0.4, 5.0, 5.0, 5.0]])
