@@ -72,8 +72,9 @@ def weighted_average(heard, column, oldest, horizon):  # type: ignore[no-untyped
 def motion_sums(heard, column, carried):  # type: ignore[no-untyped-def]
     """sum_j a_ij, sum_j a_ij x_j at present and sum_j a_ij x_j', for x_j in ``column`` and its rate in the next one.
 
-    With ``carried`` = 1 each x_j is carried to the present by its rate, with 0 it is held as it was sent. With them sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs.
-    (6.22)-(6.23). A neighbour takes part from its first record on, however old.
+    ``carried`` = 1 carries each x_j to the present by its rate, 0 holds it as it was sent. With the sums,
+    sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs. (6.22)-(6.23).
+    A neighbour takes part from its first record on, however old.
 
     Returns
     -------
