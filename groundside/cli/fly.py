@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 __all__ = ["doctor", "fly", "ps", "stop"]
 
 console = Console()
-_BAD_INPUT = 2
 _FLIGHT_FAILED = 1
 _LAST_SYSTEM = 239
 """Greatest MAVLink system id of a UAV."""
