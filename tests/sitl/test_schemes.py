@@ -14,24 +14,24 @@ from tests.sitl.conftest import Flight, same_flight
 
 
 @pytest.mark.parametrize(
-    ("scenario", "variants"),
+    ("scenario", "variants", "duration"),
     [
-        ("prescribed_performance", ("loss_30",)),
-        ("nearest_neighbour", ("lag", "loss_30")),
-        ("attitude_synchronization", ("loss_30", "delay_10")),
-        ("directed_attitude", ("loss_30", "delay_20")),
-        ("fire_monitoring", ("loss30",)),
-        ("fire_monitoring_sixdof", ("loss30",)),
+        ("prescribed_performance", ("loss_30",), 60.0),
+        ("nearest_neighbour", ("lag", "loss_30"), 60.0),
+        ("finite_time_containment", ("loss30",), 60.0),
+        ("attitude_synchronization", ("loss_30", "delay_10"), 15.0),
+        ("directed_attitude", ("loss_30", "delay_20"), 15.0),
+        ("fire_monitoring", ("loss30",), 15.0),
+        ("fire_monitoring_sixdof", ("loss30",), 15.0),
     ],
-    ids=["chapter 3", "chapter 4", "chapter 7", "chapter 8", "chapter 9", "chapter 9 by attitude targets"],
+    ids=["chapter 3", "chapter 4", "chapter 6", "chapter 7", "chapter 8", "chapter 9", "chapter 9 by attitude targets"],
 )
 def test_processes_equal_the_simulation(
-    scenario: str, variants: tuple[str, ...], fly: Callable[..., Flight], tmp_path: Path
+    scenario: str, variants: tuple[str, ...], duration: float, fly: Callable[..., Flight], tmp_path: Path
 ) -> None:
-    simulated = simulate(
-        resolve(load_case(scenario, "+".join(("flight", *variants)), duration=15.0)), tmp_path / "simulated"
-    )
+    mission = resolve(load_case(scenario, "+".join(("flight", *variants)), duration=duration))
+    simulated = simulate(mission, tmp_path / "simulated")
     assert simulated.lost == {}
-    flight = fly(scenario, "--variant", ",".join(variants), "--speed", "max", "--duration", "15")
+    flight = fly(scenario, "--variant", ",".join(variants), "--speed", "max", "--duration", f"{duration:g}")
     assert flight.wait(240) == 0, flight.output
     assert same_flight(flight.folder, tmp_path / "simulated")
