@@ -32,7 +32,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import positive, stable_in_steps
+from ftcc.airside.conditions import largest_degree, positive, stable_in_steps
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
@@ -190,6 +190,8 @@ _LEAST_AIRSPEED = 8.0
 """Airspeed guard, m/s: the surfaces' effect is proportional to V^2."""
 _LARGEST_SIDESLIP = math.radians(60.0)
 """Sideslip guard in the kinematics, rad."""
+_STEEPEST = 5.5
+"""Largest gain of the outer loop that the reference has flown, 1/rad: phi / (k eps_inf)."""
 _DEGREES = math.radians(1.0)
 _BUTTERWORTH = math.sqrt(0.5)
 _ZERO = (0.0, 0.0, 0.0)
@@ -384,4 +386,15 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     if not 0.0 < gains.edge < 1.0:
         problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
     problems += stable_in_steps({name: getattr(gains, name) for name in ("k1", "k2", "k8", "k9")}, flight.period)
+    if not any(problem.fatal for problem in problems):
+        phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)
+        steepness = phi * (1.0 / gains.k_lo + 1.0 / gains.k_up) / (2.0 * gains.eps_inf)
+        if steepness > _STEEPEST:
+            problems.append(
+                Problem(
+                    False,
+                    f"phi / (k eps_inf) = {steepness:.1f} 1/rad with the graph's weights: behind surfaces of 20 rad/s "
+                    f"control is held up to {_STEEPEST:g}, lost from 6.8 on; widen eps_inf or lower lambda1, lambda2",
+                )
+            )
     return problems

@@ -242,12 +242,18 @@ def _observed(s, own, model, gains, h):
 
 
 @compiled
+def _in_use(heard, j, gains):
+    """Whether neighbour ``j`` takes part: heard, and not silent for too long."""
+    return heard.valid[j] > 0.0 and (gains.silence <= 0.0 or heard.age[j] <= gains.silence)
+
+
+@compiled
 def _cooperative(heard, column, own, gains):
     """Cooperative error (R1) of the value in ``column``, and the sum of the weights of those who are heard."""
     total = gains.lam1 * own
     degree = 0.0
     for j in range(heard.weight.shape[0]):
-        if heard.valid[j] > 0.0 and (gains.silence <= 0.0 or heard.age[j] <= gains.silence):
+        if _in_use(heard, j, gains):
             total += gains.lam2 * heard.weight[j] * (own - heard.values[j, column])
             degree += heard.weight[j]
     return total, degree
@@ -258,7 +264,7 @@ def _fed(heard, column, gains):
     """The neighbours' commanded accelerations (R5), for the monograph form."""
     total = 0.0
     for j in range(heard.weight.shape[0]):
-        if heard.valid[j] > 0.0:
+        if _in_use(heard, j, gains):
             total += heard.weight[j] * heard.values[j, column]
     return gains.feed * gains.lam2 * total
 

@@ -82,6 +82,8 @@ def test_the_tables_of_section_8_are_claimed_cell_by_cell() -> None:
         "flight+wave",
         *(f"flight+{wave}exchange_{rate}" for rate in RATES for wave in ("", "wave+")),
     }
+    held = {"flight+held", *(f"flight+exchange_{rate}+held" for rate in RATES)}
+    assert cases_of("neighbours held: position error") == cases_of("neighbours held: altitude error") == held
     lossy = {f"flight+wave+{rate}loss{loss}" for rate in ("", "exchange_10+") for loss in LOSSES}
     assert cases_of("records lost: position error") == lossy
     assert lossy < cases_of("records lost: altitude error")

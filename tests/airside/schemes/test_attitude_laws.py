@@ -129,6 +129,17 @@ def test_what_only_one_law_demands():
     assert any("k1" in problem.text for problem in second.check(second.gains("flight", {}), slow))
 
 
+@pytest.mark.parametrize(
+    ("gains", "steep"),
+    [({}, False), ({"eps_inf": 0.1}, True), ({"lambda1": 0.8, "lambda2": 0.5}, True), ({"lambda2": 0.2}, False)],
+)
+def test_a_tighter_bound_is_a_higher_gain_of_which_the_second_law_warns(gains, steep):
+    """Reference section on sampled-data limits: phi / (k eps_inf) beyond 5.5 1/rad; 5.45 on this ring as published."""
+    law = find("directed_attitude")
+    found = [p for p in law.check(law.gains("flight", gains), FLIGHT) if "phi / (k eps_inf)" in p.text]
+    assert [p.fatal for p in found] == [False] * steep
+
+
 def test_each_law_demands_its_own_graph():
     one_way = Graph((1, 2, 3), (), {(1, 2): 1.0, (2, 3): 1.0, (3, 1): 1.0})
     one_way.require(find("directed_attitude").graph)
