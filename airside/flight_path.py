@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ftcc.link.attitude_target import path_of
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import body_axes
 
 __all__ = ["Own", "decode_state"]
 
@@ -62,33 +63,23 @@ def decode_state(message, t, command, own):
     own : (18,) float
         Written.
     """
-    q0, q1, q2, q3 = message[0], message[1], message[2], message[3]
     vx, vy, vz = message[10], message[11], message[12]
     speed, gamma, chi = path_of(vx, vy, vz)
-    # Columns of the rotation body -> NED.
-    r11 = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3
-    r21 = 2.0 * (q1 * q2 + q0 * q3)
-    r31 = 2.0 * (q1 * q3 - q0 * q2)
-    r12 = 2.0 * (q1 * q2 - q0 * q3)
-    r22 = q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3
-    r32 = 2.0 * (q2 * q3 + q0 * q1)
-    r13 = 2.0 * (q1 * q3 + q0 * q2)
-    r23 = 2.0 * (q2 * q3 - q0 * q1)
-    r33 = q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
-    u = r11 * vx + r21 * vy + r31 * vz
-    v = r12 * vx + r22 * vy + r32 * vz
-    w = r13 * vx + r23 * vy + r33 * vz
+    nose, wing, belly = body_axes(message[0], message[1], message[2], message[3])
+    u = nose[0] * vx + nose[1] * vy + nose[2] * vz
+    v = wing[0] * vx + wing[1] * vy + wing[2] * vz
+    w = belly[0] * vx + belly[1] * vy + belly[2] * vz
     alpha = math.atan2(w, u)
     beta = math.atan2(v, math.sqrt(u * u + w * w))
     # Bank: the body's y axis, freed of sideslip, against the horizontal normal of the path and its "down".
     east_x, east_y = -math.sin(chi), math.cos(chi)
     down_x, down_y, down_z = math.sin(gamma) * math.cos(chi), math.sin(gamma) * math.sin(chi), math.cos(gamma)
-    side = r12 * east_x + r22 * east_y
-    fall = r12 * down_x + r22 * down_y + r32 * down_z
+    side = wing[0] * east_x + wing[1] * east_y
+    fall = wing[0] * down_x + wing[1] * down_y + wing[2] * down_z
     mu = math.atan2(fall, side)
     own[0] = t
     own[1], own[2], own[3] = message[7], message[8], -message[9]
     own[4], own[5], own[6], own[7], own[8], own[9] = speed, gamma, chi, mu, alpha, beta
-    own[10] = math.atan2(-r31, math.sqrt(r32 * r32 + r33 * r33))
+    own[10] = math.atan2(-nose[2], math.sqrt(wing[2] * wing[2] + belly[2] * belly[2]))
     own[11], own[12], own[13] = message[4], message[5], message[6]
     own[14], own[15], own[16], own[17] = command[0], command[1], command[2], command[3]

@@ -6,7 +6,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["body_attitude", "quaternion_product"]
+__all__ = ["body_attitude", "body_axes", "quaternion_product"]
 
 
 @compiled
@@ -28,3 +28,13 @@ def body_attitude(chi, gamma, mu, alpha, beta):
     q0, q1, q2, q3 = quaternion_product(q0, q1, q2, q3, math.cos(0.5 * mu), math.sin(0.5 * mu), 0.0, 0.0)
     q0, q1, q2, q3 = quaternion_product(q0, q1, q2, q3, math.cos(0.5 * beta), 0.0, 0.0, -math.sin(0.5 * beta))
     return quaternion_product(q0, q1, q2, q3, math.cos(0.5 * alpha), 0.0, math.sin(0.5 * alpha), 0.0)
+
+
+@compiled
+def body_axes(q0, q1, q2, q3):
+    """Nose, right wing and belly of the attitude: unit vectors in north-east-down, columns of its rotation matrix."""
+    return (
+        (q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2.0 * (q1 * q2 + q0 * q3), 2.0 * (q1 * q3 - q0 * q2)),
+        (2.0 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2.0 * (q2 * q3 + q0 * q1)),
+        (2.0 * (q1 * q3 + q0 * q2), 2.0 * (q2 * q3 - q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3),
+    )

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import body_axes
 from ftcc.sim.airframe import Airframe, attitude_rates
 from ftcc.sim.inner_loop import LoopState, deflections, load_factor, loop_rates
 from ftcc.sim.plant import (
@@ -121,11 +122,7 @@ def _against(s, vx, vy, vz):
     ground = math.sqrt(vx * vx + vy * vy)
     speed = math.sqrt(ground * ground + vz * vz)
     gamma, chi = math.atan2(vz, ground), math.atan2(vy, vx)
-    q0, q1, q2, q3 = s.q0, s.q1, s.q2, s.q3
-    # Columns of the rotation from body to north-east-down: nose, right wing, belly.
-    nose = (q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2.0 * (q1 * q2 + q0 * q3), 2.0 * (q1 * q3 - q0 * q2))
-    wing = (2.0 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2.0 * (q2 * q3 + q0 * q1))
-    belly = (2.0 * (q1 * q3 + q0 * q2), 2.0 * (q2 * q3 - q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3)
+    nose, wing, belly = body_axes(s.q0, s.q1, s.q2, s.q3)
     u = nose[0] * vx + nose[1] * vy - nose[2] * vz
     v = wing[0] * vx + wing[1] * vy - wing[2] * vz
     w = belly[0] * vx + belly[1] * vy - belly[2] * vz
