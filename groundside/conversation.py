@@ -17,7 +17,7 @@ import numpy as np
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.registry import Card, Entry, find
 from ftcc.link.codec import Codec
-from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, STATION, as_typed, dialect
+from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, NAME_LENGTH, STATION, as_typed, dialect
 from ftcc.link.signing import KeyFileError, Signing, read_key
 
 __all__ = ["Conversation", "NoAnswerError", "RefusedError", "StationError"]
@@ -168,14 +168,16 @@ class Conversation:
 
     def _read(self, uav: int, name: str) -> tuple[float, int]:
         """Value and type of a parameter."""
-        request = dialect.MAVLink_param_request_read_message(self.system(uav), AUTOPILOT, name.encode()[:16], -1)
+        request = dialect.MAVLink_param_request_read_message(
+            self.system(uav), AUTOPILOT, name.encode()[:NAME_LENGTH], -1
+        )
         return self._parameter(uav, request, name)
 
     def _parameter(self, uav: int, request: Any, name: str) -> tuple[float, int]:
         def answers(message: Any) -> bool:
             return message.get_type() in ("PARAM_VALUE", "PARAM_ERROR") and message.param_id.upper() == name.upper()
 
-        if len(name) > 16:
+        if len(name) > NAME_LENGTH:
             raise RefusedError(f"UAV {uav} has no parameter {name}")
         answer = self._ask(uav, [request], answers, f"parameter {name}")
         if answer.get_type() == "PARAM_ERROR":

@@ -15,6 +15,7 @@ from ftcc.link.codec import Codec, dialect
 __all__ = [
     "AUTOPILOT",
     "LOOPBACK",
+    "NAME_LENGTH",
     "SIMULATOR",
     "STATION",
     "Endpoint",
@@ -40,6 +41,8 @@ SIMULATOR = 25
 """Component id of a simulated vehicle (MAV_COMP_ID_USER1)."""
 STATION = 254
 """System id of the ground station; 245 and 255 are those of other people's clients."""
+NAME_LENGTH = 16
+"""Characters of a parameter's name, at most."""
 LOOPBACK = "127.0.0.1"
 
 _DATAGRAMS_PER_READ = 64

@@ -22,10 +22,7 @@ from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
 from ftcc.link.mavlink import as_typed, dialect
 
-__all__ = ["NAME_LENGTH", "Parameter", "Parameters", "RefusedError"]
-
-NAME_LENGTH = 16
-"""Characters of a parameter's name, at most."""
+__all__ = ["Parameter", "Parameters", "RefusedError"]
 
 _INTEGER = dialect.MAV_PARAM_TYPE_INT32
 _FLOAT = dialect.MAV_PARAM_TYPE_REAL32
