@@ -14,9 +14,9 @@ import numpy as np
 from ftcc.airside.references.profiles import Profile, climb_range, largest_acceleration
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
-from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Start
+from ftcc.groundside.table import LEADING
 from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
 from ftcc.link.timing import Timing

@@ -35,9 +35,9 @@ from ftcc.groundside.fire import check_posts
 from ftcc.groundside.leaders import check_clearance, limited, profiles_of
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
-from ftcc.groundside.run import LEADING
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, PointMassSheet, RateLimits
+from ftcc.groundside.table import LEADING
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel

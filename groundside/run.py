@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,19 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.errors import UserError
+from ftcc.groundside.table import write_table
 from ftcc.link.recording import LINK_COLUMNS, Column, arrow_schema, read_events, read_part
-from ftcc.sim.plant import TRUTH
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
     from ftcc.groundside.scenario import Scenario
 
-__all__ = ["LEADING", "NothingRecordedError", "Run", "RunError", "new_folder", "write_table"]
-
-_SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
-
-LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
-"""The first columns of ``signals.parquet``; the scheme's SIGNALS follow."""
+__all__ = ["NothingRecordedError", "Run", "RunError", "new_folder"]
 
 
 class RunError(UserError):
@@ -67,34 +62,6 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs", hol
     except OSError as error:
         raise RunError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
     return folder
-
-
-def _ordered(columns: Sequence[Column]) -> list[Column]:
-    """Columns without repetition, the leading ones first."""
-    unique = {column.name: column for column in reversed(columns)}
-    first = [unique[name] for name in LEADING if name in unique]
-    rest = [column for column in dict.fromkeys(unique[c.name] for c in columns) if column.name not in LEADING]
-    return first + rest
-
-
-def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> None:
-    """Write a table: a Parquet file that appears when it is complete.
-
-    Parameters
-    ----------
-    path : Path
-    columns : sequence of Column
-        Of all parts, repetitions allowed.
-    values : mapping of arrays by column name, one row per tick and UAV.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    ordered = _ordered(columns)
-    table = pa.Table.from_arrays([pa.array(values[c.name]) for c in ordered], schema=arrow_schema(ordered))
-    unfinished = path.with_suffix(f".{os.getpid()}")
-    pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
-    unfinished.replace(path)
 
 
 class NothingRecordedError(RunError):

@@ -17,7 +17,8 @@ from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.autopilots import tick_of, told
 from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
-from ftcc.groundside.run import Run, write_table
+from ftcc.groundside.run import Run
+from ftcc.groundside.table import write_table
 from ftcc.link.actuators import ACTUATORS, in_slots
 from ftcc.link.attitude_target import TARGET
 from ftcc.link.channel import LINK_REPORT
