@@ -70,6 +70,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"max_content_width": 110},
 )
 for _title, _commands in _SECTIONS.items():
     for _command in _commands:

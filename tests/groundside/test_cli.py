@@ -41,6 +41,24 @@ def test_list_shows_schemes_scenarios_forms_and_variants(ftcc: Callable[..., Out
         assert word in out
 
 
+@pytest.mark.parametrize(("columns", "whole"), [(80, False), (120, True)])
+def test_help_lists_the_commands_by_section(
+    ftcc: Callable[..., Outcome], monkeypatch: pytest.MonkeyPatch, columns: int, whole: bool
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    code, out, _ = ftcc("--help")
+    assert code == 0
+    sections = {
+        title: re.findall(r"^  (\w+)  ", rows, re.M) for title, rows in re.findall(r"^(.+):\n((?:  .+\n)+)", out, re.M)
+    }
+    assert list(sections) == ["Options", "Scenarios", "Flights", "Results", "Commands to a running swarm"]
+    assert {"check", "verify"} <= set(sections["Scenarios"])
+    assert {"fly", "watch"} <= set(sections["Flights"])
+    assert sections["Results"] == ["report", "compare", "replay"]
+    assert {"fault", "link", "pause"} <= set(sections["Commands to a running swarm"])
+    assert ("List schemes and shipped scenarios with their forms and variants." in out) == whole
+
+
 def test_check_names_every_case_that_it_checked(ftcc: Callable[..., Outcome]) -> None:
     code, out, _ = ftcc("check", "demo")
     assert code == 0
