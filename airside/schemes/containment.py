@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import above_leaders_climb, largest_degree, positive, stable_in_steps
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, not_negative, positive, stable_in_steps
 from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
 from ftcc.airside.elements.neighbours import disagreement
 from ftcc.airside.elements.observers import disturbance_observer_rate, sliding_mode_observer
@@ -327,7 +327,7 @@ def climb_limit(gains: Gains) -> float:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = positive(gains, "k11 k12 k21 k31 k41 k51 k22 k42 k52 e1 e2 l1 l2 beta1 phi")
+    problems = [*positive(gains, "k11 k21 k31 k41 k51 k22 k42 k52 e1 e2 l1 l2 beta1 phi"), *not_negative(gains, "k12")]
     if gains.substeps < 1.0 or gains.substeps != int(gains.substeps):
         return [*problems, Problem(True, f"gain substeps = {gains.substeps}: must be a whole number >= 1")]
     problems += above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")

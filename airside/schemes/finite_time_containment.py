@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import largest_degree, positive, stable_in_steps
+from ftcc.airside.conditions import largest_degree, not_negative, positive, stable_in_steps
 from ftcc.airside.elements.filters import butterworth, sliding_mode_differentiator
 from ftcc.airside.elements.neighbours import motion_sums
 from ftcc.airside.elements.networks import adaptation_step, diagonal_energy, learned_gain
@@ -383,9 +383,10 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(
         gains,
-        "beta1 beta2 beta3 beta4 kappa k11 k21 k22 k31 k41 k51 k61 k62 z11 z12 z21 z22 z31 z32 z41 z42 g11 g12 g21 g22 "
-        "g31 g32 g41 g42 h11 h12 h21 h22 h31 h32 h41 h42 nu1 nu2 mu1 mu2 width low_pass",
+        "beta1 beta2 beta3 beta4 kappa k11 k21 k22 k31 k41 k51 k61 k62 z11 z12 z21 z22 z31 z32 z41 z42 nu1 nu2 mu1 "
+        "mu2 width low_pass",
     )
+    problems += not_negative(gains, "g11 g12 g21 g22 g31 g32 g41 g42 h11 h12 h21 h22 h31 h32 h41 h42")
     for name in ("a", "r"):
         if not 0.0 < getattr(gains, name) < 1.0:
             problems.append(

@@ -410,13 +410,13 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
     problems = positive(
         gains,
-        "k11 k12 beta1 phi tube_first tube_last tube_decay kl ku k21 k31 k41 k51 k52 tau1 tau2 tau3 w21 w22 w23 w24 "
-        "g11 w41 w42 w43 w44 g21 mu network_filter inner servo",
+        "k11 beta1 phi tube_first tube_last tube_decay kl ku k21 k31 k41 k51 k52 tau1 tau2 tau3 w21 w22 w23 w41 "
+        "w42 w43 mu network_filter inner servo",
     )
     problems += not_negative(
         gains,
-        "k13 beta2 networks auxiliary xi_term estimator lead_slow lead_fast observer_limit rate_filter smoother a_max "
-        "altitude_filter gamma_limit theta_limit q_limit cap horizon",
+        "k12 k13 g11 g21 w24 w44 beta2 networks auxiliary xi_term estimator lead_slow lead_fast observer_limit "
+        "rate_filter smoother a_max altitude_filter gamma_limit theta_limit q_limit cap horizon",
     )
     if problems:
         return problems

@@ -11,6 +11,7 @@ import pytest
 
 from ftcc.groundside.mission import resolve
 from ftcc.groundside.scenario import ScenarioError, load, shipped
+from ftcc.groundside.simulate import fly
 from ftcc.sim.airframe import Airframe
 
 Document = dict[str, Any]
@@ -27,6 +28,21 @@ def test_settings_come_after_variants_and_variants_after_the_form() -> None:
     assert plan.rates.exchange_rate == 20.0
     plan = load("containment", variants=["P"], settings=["gains.k11=5", "faults.1.at=240.5", "scheme=other"]).plan
     assert (plan.gains.common["k11"], plan.faults[1].at, plan.scheme) == (5.0, 240.5, "other")
+
+
+@pytest.mark.parametrize(
+    ("scheme", "gains", "adapted"),
+    [
+        ("prescribed_performance", "k12 g11 g21 w24 w44", ("F_gamma", "F_q")),
+        ("containment", "k12", ()),
+        ("finite_time_containment", "g11 g12 g21 g22 g31 g32 g41 g42 h11 h42", ("chi11", "chi42")),
+    ],
+)
+def test_integrals_adaptation_and_leaks_may_be_taken_out(scheme: str, gains: str, adapted: tuple[str, ...]) -> None:
+    without = [f"gains.{gain}=0.0" for gain in gains.split()]
+    flight = fly(resolve(load(scheme, form="flight", duration=10.0, settings=without)))
+    assert flight.lost == {}
+    assert all((flight.column(signal, 1) == 0.0).all() for signal in adapted)
 
 
 def test_variants_apply_in_the_order_of_the_file_and_name_the_case_so() -> None:
