@@ -23,7 +23,7 @@ _MASK = 0xFFFFFFFF
 def philox(seed: int, a: int, b: int, c: int, d: int):
     """Four 32-bit integers for the 64-bit key ``seed`` and the counter ``(a, b, c, d)`` of 32-bit integers."""
     # Numbers from arrays would warn of the overflow that is meant here.
-    a, b, c, d = int(a), int(b), int(c), int(d)
+    seed, a, b, c, d = int(seed), int(a), int(b), int(c), int(d)
     k0 = seed & _MASK
     k1 = (seed >> 32) & _MASK
     for _ in range(10):
