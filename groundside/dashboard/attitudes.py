@@ -7,6 +7,7 @@ import math
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline
 from ftcc.groundside.dashboard.subject import Subject
@@ -27,7 +28,8 @@ class Attitudes:
     """Draws the true attitude of every aircraft with its course turned ahead, away from who looks.
 
     Where aircraft turn away from each other their places soon tell nothing; their attitudes are what they agree on. The
-    places here are slots, and not true.
+    places here are slots, and not true. Each slot is turned as its line of sight is, so that equal attitudes look
+    equal: all are seen as from straight behind them.
     """
 
     title = "Attitudes, each along its own course (outlines: references; places are slots)"
@@ -42,18 +44,18 @@ class Attitudes:
             uav: ((i % columns - 0.5 * (columns - 1)) * _SPACING, 0.0, (0.5 * (rows - 1) - i // columns) * _RISE)
             for i, uav in enumerate(self._uavs)
         }
-        self._distance = max(rows * _RISE, 0.5 * columns * _SPACING)
+        self._eye = 1.3 * max(rows * _RISE, 0.5 * columns * _SPACING) * np.array([0.0, -1.0, 0.3])
+        self._turns = {uav: _turn(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()}
         self._poses = Poses()
         self._labels: dict[int, str] = {}
 
     def view(self) -> rrb.Spatial3DView:
         """The slots from behind, and a little above."""
-        eye = 1.3 * self._distance * np.array([0.0, -1.0, 0.3])
         return rrb.Spatial3DView(
             origin="/attitudes",
             name=self.title,
             eye_controls=rrb.EyeControls3D(
-                kind=rrb.Eye3DKind.Orbital, position=eye, look_target=(0.0, 0.0, 0.0), eye_up=(0, 0, 1)
+                kind=rrb.Eye3DKind.Orbital, position=self._eye, look_target=(0.0, 0.0, 0.0), eye_up=(0, 0, 1)
             ),
             line_grid=rrb.LineGrid3D(visible=False),
         )
@@ -89,9 +91,18 @@ class Attitudes:
             if state is None:
                 continue
             ahead = {**state.truth, "chi": 0.0}
-            entries.append(Entry(f"/attitudes/uav/{uav}", snapshot.t, self._poses.of(self._slots[uav], ahead)))
+            slot, turn = self._slots[uav], self._turns[uav]
+            entries.append(Entry(f"/attitudes/uav/{uav}", snapshot.t, self._poses.of(slot, ahead, turn)))
             wanted = {name: state.signals.get(signal, math.nan) for name, signal in _REFERENCES.items()}
             if all(map(math.isfinite, wanted.values())):
-                pose = self._poses.of(self._slots[uav], {**ahead, **wanted})
+                pose = self._poses.of(slot, {**ahead, **wanted}, turn)
                 entries.append(Entry(f"/attitudes/reference/{uav}", snapshot.t, pose))
         return entries
+
+
+def _turn(before: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """The shortest rotation from one direction to another, not its opposite, as a quaternion."""
+    a, b = before / np.linalg.norm(before), after / np.linalg.norm(after)
+    q = np.array([1.0 + a @ b, *np.cross(a, b)])
+    w, x, y, z = (q / np.linalg.norm(q)).tolist()
+    return w, x, y, z

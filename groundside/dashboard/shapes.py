@@ -37,10 +37,18 @@ class Poses:
     def __init__(self) -> None:
         self._message = np.zeros(len(STATE_MESSAGE))
 
-    def of(self, place: Sequence[float] | NDArray[np.float64], truth: Mapping[str, float]) -> rr.Transform3D:
-        """At ``place`` (east, north, up; m) with the attitude of true states by name; a missing one is 0."""
+    def of(
+        self,
+        place: Sequence[float] | NDArray[np.float64],
+        truth: Mapping[str, float],
+        turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    ) -> rr.Transform3D:
+        """At ``place`` (east, north, up; m) with the attitude of true states by name; a missing one is 0.
+
+        ``turn`` is a further rotation, a quaternion in the world's axes.
+        """
         encode_state(np.array([truth.get(field, 0.0) for field in TRUTH]), self._message)
-        w, x, y, z = quaternion_product(*_NORTH_TO_WORLD, *self._message[:4])
+        w, x, y, z = quaternion_product(*turn, *quaternion_product(*_NORTH_TO_WORLD, *self._message[:4]))
         return rr.Transform3D(translation=place, quaternion=rr.Quaternion(xyzw=(x, y, z, w)))
 
 
