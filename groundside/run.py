@@ -123,9 +123,13 @@ class Run:
     def file(self) -> Path:
         """``signals.parquet``, merged from the parts where there is none or they have grown since."""
         path = self.path / "signals.parquet"
-        parts = [part.stat().st_mtime_ns for part in (self.path / "parts").glob("*.arrows")]
-        merged = path.is_file() and path.stat().st_mtime_ns >= max(parts, default=0)
+        merged = path.is_file() and path.stat().st_mtime_ns >= self._recorded_until
         return path if merged else self.merge()
+
+    @property
+    def _recorded_until(self) -> int:
+        """When a process last wrote a part, ns; 0 without parts."""
+        return max((part.stat().st_mtime_ns for part in (self.path / "parts").glob("*.arrows")), default=0)
 
     @functools.cached_property
     def signals(self) -> Any:
@@ -207,6 +211,8 @@ class Run:
         RunError
             If no process wrote anything: `NothingRecordedError`.
         """
+        # Taken before the parts are read: what is written to them meanwhile makes the table old.
+        as_of = self._recorded_until
         tables: dict[int, list[Any]] = {}
         for path in sorted((self.path / "parts").glob("*.arrows")):
             table = read_part(path) if not path.stem.endswith("-links") else None
@@ -228,7 +234,7 @@ class Run:
         values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
         order = np.lexsort((values["uav"], values["t"]))
         target = self.path / "signals.parquet"
-        write_table(target, columns, {name: column[order] for name, column in values.items()})
+        write_table(target, columns, {name: column[order] for name, column in values.items()}, as_of)
         return target
 
     @functools.cached_property

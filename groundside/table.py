@@ -28,7 +28,9 @@ def _ordered(columns: Sequence[Column]) -> list[Column]:
     return first + rest
 
 
-def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> None:
+def write_table(
+    path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]], as_of: int | None = None
+) -> None:
     """Write a table: a Parquet file that appears when it is complete.
 
     Parameters
@@ -37,6 +39,8 @@ def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDAr
     columns : sequence of Column
         Of all parts, repetitions allowed.
     values : mapping of arrays by column name, one row per tick and UAV.
+    as_of : int, optional
+        The file's time of change, ns; default: now.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -45,4 +49,6 @@ def write_table(path: Path, columns: Sequence[Column], values: Mapping[str, NDAr
     table = pa.Table.from_arrays([pa.array(values[c.name]) for c in ordered], schema=arrow_schema(ordered))
     unfinished = path.with_suffix(f".{os.getpid()}")
     pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
+    if as_of is not None:
+        os.utime(unfinished, ns=(as_of, as_of))
     unfinished.replace(path)

@@ -73,6 +73,16 @@ def test_the_recording_is_the_flight(demo_run: Run) -> None:
             np.testing.assert_array_equal(demo_run.column(name, uav), flight.column(name, uav))
 
 
+def test_a_run_that_goes_on_is_merged_anew_and_shows_one_state_at_a_time(demo_run: Run, tmp_path: Path) -> None:
+    run = write_parts(demo_run, tmp_path / "goes-on", lambda uav, role: 500)
+    then = run.end
+    assert run.file.stat().st_mtime_ns == max(part.stat().st_mtime_ns for part in (run.path / "parts").iterdir())
+    whole = write_parts(demo_run, tmp_path / "whole")
+    shutil.copytree(whole.path / "parts", run.path / "parts", dirs_exist_ok=True)
+    assert Run(run.path).end == demo_run.end > then
+    assert len(run.column("z", 1)) == len(run.column("t", 1)) == 500
+
+
 def test_parts_merge_into_the_very_file_that_the_single_process_writes(demo_run: Run, tmp_path: Path) -> None:
     merged = write_parts(demo_run, tmp_path / "parts-run")
     assert merged.signals.schema.equals(demo_run.signals.schema, check_metadata=True)
