@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
+from ftcc.groundside.snapshot import Event, LinkState, Pace, Snapshot, UavState
 from ftcc.link.ports import runtime_folder
 
 __all__ = ["Feed", "decoded", "encoded", "feed_path", "watched"]
@@ -40,7 +40,8 @@ def decoded(line: bytes) -> Snapshot:
     try:
         told = json.loads(line)
         uavs = {int(uav): _state(state) for uav, state in told["uavs"].items()}
-        return Snapshot(float(told["t"]), uavs, tuple(Event(**event) for event in told["events"]))
+        pace = Pace(**told["pace"]) if told.get("pace") else None
+        return Snapshot(float(told["t"]), uavs, tuple(Event(**event) for event in told["events"]), pace)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"no snapshot: {error!r}") from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-__all__ = ["Event", "LinkState", "Snapshot", "UavState"]
+__all__ = ["Event", "LinkState", "Pace", "Snapshot", "UavState"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,20 @@ class UavState:
 
 
 @dataclass(frozen=True)
+class Pace:
+    """How fast the swarm flies on the wall clock, and why not faster."""
+
+    factor: float
+    """Times real time, reached over the last seconds; nan while it is not known yet."""
+    asked: float | None
+    """Times real time that were asked for; None = as fast as possible."""
+    limit: str = ""
+    """What limits it, in one short sentence; empty if nothing does."""
+    advice: str = ""
+    """What would help."""
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """The swarm."""
 
@@ -72,6 +86,8 @@ class Snapshot:
     uavs: Mapping[int, UavState]
     events: tuple[Event, ...] = field(default=())
     """What happened since the last snapshot."""
+    pace: Pace | None = None
+    """None where nobody measures it, as in a recorded run."""
 
     def after(self, earlier: tuple[Event, ...]) -> Snapshot:
         """The same with what happened before."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.blueprints import blueprint
+from ftcc.groundside.dashboard.pace import PaceCurve
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
 from ftcc.groundside.dashboard.subject import Subject
@@ -18,6 +19,7 @@ class Artists:
     """Turns snapshots into what is logged. The first one tells how large the swarm is."""
 
     def __init__(self, subject: Subject, first: Snapshot) -> None:
+        self._pace = PaceCurve() if first.pace is not None else None
         self._scene = Scene(subject, first)
         self._attitudes = Attitudes(subject) if subject.family == "attitude" else None
         self._plots = Plots(subject)
@@ -25,13 +27,26 @@ class Artists:
 
     def static(self) -> list[Entry]:
         """What is logged once, the blueprint first."""
-        layout = Entry(BLUEPRINT, None, blueprint(self._scene, self._attitudes, self._plots, self._table))
         attitudes = self._attitudes.static() if self._attitudes is not None else []
-        return [layout, *self._scene.static(), *attitudes, *self._plots.static()]
+        pace = self._pace.static() if self._pace is not None else []
+        return [self._layout(), *self._scene.static(), *attitudes, *self._plots.static(), *pace]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """One instant, and what happened before it."""
         entries = [*self._scene.draw(snapshot), *self._plots.draw(snapshot), *self._table.draw(snapshot)]
         if self._attitudes is not None:
             entries += self._attitudes.draw(snapshot)
-        return entries + events(snapshot.events)
+        return entries + self._draw_pace(snapshot) + events(snapshot.events)
+
+    def _draw_pace(self, snapshot: Snapshot) -> list[Entry]:
+        """Times real time; its plot joins the layout when the first pace is told, for a recorded run tells none."""
+        if self._pace is not None:
+            return self._pace.draw(snapshot)
+        if snapshot.pace is None:
+            return []
+        self._pace = PaceCurve()
+        return [self._layout(), *self._pace.static(), *self._pace.draw(snapshot)]
+
+    def _layout(self) -> Entry:
+        layout = blueprint(self._scene, self._attitudes, self._plots, self._table, self._pace)
+        return Entry(BLUEPRINT, None, layout)

@@ -10,6 +10,7 @@ from ftcc.groundside.dashboard.table import log_view
 
 if TYPE_CHECKING:
     from ftcc.groundside.dashboard.attitudes import Attitudes
+    from ftcc.groundside.dashboard.pace import PaceCurve
     from ftcc.groundside.dashboard.plots import Plots
     from ftcc.groundside.dashboard.scene import Scene
     from ftcc.groundside.dashboard.table import Table
@@ -20,12 +21,15 @@ _BESIDE = 4
 """Plots below one another; more stand in two columns."""
 
 
-def blueprint(scene: Scene, attitudes: Attitudes | None, plots: Plots, table: Table) -> rrb.Blueprint:
+def blueprint(
+    scene: Scene, attitudes: Attitudes | None, plots: Plots, table: Table, pace: PaceCurve | None
+) -> rrb.Blueprint:
     """The layout that goes into the viewer and into the recording."""
     swarm = scene.view()
     groups = plots.views()
     first = groups.pop("Tracking")
     tabs = [_stack(views, name) for name, views in groups.items()]
+    tabs += [_stack([pace.view()], "Pace")] if pace is not None else []
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(

@@ -15,7 +15,7 @@ from ftcc.groundside.dashboard.words import name
 from ftcc.groundside.palette import GRAY, Color, colors
 from ftcc.groundside.snapshot import Snapshot
 
-__all__ = ["WINDOW", "Plots"]
+__all__ = ["WINDOW", "Plots", "time_series"]
 
 WINDOW = 60.0
 """Time that the plots show, s."""
@@ -116,9 +116,14 @@ def _curves_of(panel: Panel) -> str:
 def _view(panel: Panel) -> rrb.View:
     unit = f", {panel.shown_unit}" if panel.unit != "-" else ""
     notes = f" ({', '.join(panel.notes)})" if panel.notes else ""
+    return time_series(panel.path, f"{panel.title}{unit}{notes}")
+
+
+def time_series(origin: str, title: str) -> rrb.View:
+    """A plot of the last `WINDOW` seconds."""
     return rrb.TimeSeriesView(
-        origin=panel.path,
-        name=f"{panel.title}{unit}{notes}",
+        origin=origin,
+        name=title,
         # A legend of eight lines would cover the curves; the other views show the colours, the pointer names a curve.
         plot_legend=rrb.PlotLegend(visible=False),
         time_ranges=rrb.VisibleTimeRange(

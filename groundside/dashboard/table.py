@@ -8,6 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
+from ftcc.groundside.dashboard.pace import in_words
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import faults, name, silent_since
@@ -44,7 +45,8 @@ class Table:
         rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in sorted(self._subject.graph.uavs))]
         # A recording knows no modes.
         shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
-        return "\n".join(f"| {' | '.join(row[:shown])} |" for row in rows)
+        pace = [in_words(snapshot.pace), ""] if snapshot.pace is not None else []
+        return "\n".join([*pace, *(f"| {' | '.join(row[:shown])} |" for row in rows)])
 
     def _row(self, uav: int, snapshot: Snapshot) -> tuple[str, ...]:
         leads = uav in self._subject.leaders

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import re
 import signal
@@ -20,11 +21,12 @@ import pytest
 import rerun as rr
 
 from ftcc.groundside.dashboard import Dashboard
+from ftcc.groundside.dashboard.pace import in_words
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
 from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
-from ftcc.groundside.snapshot import Snapshot, UavState
+from ftcc.groundside.snapshot import Pace, Snapshot, UavState
 from ftcc.sim.obstacles import Obstacle
 from tests import rrd
 from tests.groundside.synthetic_swarm import (
@@ -298,6 +300,32 @@ def test_colours_are_distinct_and_readable_on_white_and_on_black() -> None:
         # Contrast ratio as the Web Content Accessibility Guidelines define it.
         assert 1.05 / (luminance + 0.05) > 2.0
         assert (luminance + 0.05) / 0.05 > 3.0
+
+
+@pytest.mark.parametrize("told_from", [0.0, 2.0])
+def test_the_pace_is_said_and_drawn_from_when_it_is_told(tmp_path: Path, told_from: float) -> None:
+    pace = Pace(5.2, 10.0, "both cores busy", "try --pack auto")
+    dashboard = make(tmp_path / "swarm.rrd")
+    for snap in flight(4.0):
+        dashboard.log(dataclasses.replace(snap, pace=pace if snap.t >= told_from else None))
+    dashboard.close()
+    times, values = rows(tmp_path / "swarm.rrd", "/plots/pace", "Scalars:scalars")
+    assert times[0] == told_from
+    assert values[-1] == [5.2, 10.0]
+    said = at(tmp_path / "swarm.rrd", "/swarm", "TextDocument:text", 3.0)[0]
+    assert said.startswith("5.2 x real time (asked: 10): both cores busy, try --pack auto\n")
+
+
+@pytest.mark.parametrize(
+    ("pace", "words"),
+    [
+        (Pace(1.0, 1.0), "1 x real time"),
+        (Pace(12.4, None), "12 x real time (as fast as possible)"),
+        (Pace(math.nan, 2.0), "- x real time (asked: 2)"),
+    ],
+)
+def test_the_pace_in_words(pace: Pace, words: str) -> None:
+    assert in_words(pace) == words
 
 
 def test_a_killed_recording_is_readable_to_its_last_seconds(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from ftcc.groundside import feed as feed_module
 from ftcc.groundside.feed import Feed, decoded, encoded, feed_path, watched
-from ftcc.groundside.snapshot import Event, LinkState, Snapshot
+from ftcc.groundside.snapshot import Event, LinkState, Pace, Snapshot
 from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot
 
 
@@ -35,6 +35,12 @@ def stuck(name: str) -> socket.socket:
 
 def test_a_snapshot_arrives_as_it_was_sent() -> None:
     sent = snapshot(21.0, HAPPENINGS)
+    assert decoded(encoded(sent)) == sent
+
+
+def test_the_pace_arrives_as_it_was_sent() -> None:
+    pace = Pace(5.2, None, "both cores busy", "try --pack auto")
+    sent = dataclasses.replace(snapshot(1.0), pace=pace)
     assert decoded(encoded(sent)) == sent
 
 
