@@ -1,8 +1,4 @@
-"""The autopilots of a process as plain arrays, a row each, and the stages of their tick.
-
-A tick is ``sense -> hear -> refer -> control -> actuate -> tell -> report``; see `process` for the stages that touch
-sockets. No stage reads a wall clock.
-"""
+"""The autopilots of a process as plain arrays, a row each, and what all schemes have in common of their tick."""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.flight_path import Own, decode_state
+from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.airside.references.longitudinal import Reference
@@ -37,7 +33,7 @@ from ftcc.airside.references.profiles import (
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, OwnReference
-from ftcc.link.actuators import ACTUATORS, SLOT, decode_command, encode_command
+from ftcc.link.actuators import ACTUATORS, SLOT, encode_command
 from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
@@ -51,13 +47,11 @@ __all__ = [
     "build",
     "lead",
     "placeholder",
-    "sense",
-    "sense_all",
     "tick_of",
     "told",
 ]
 
-
+_V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
 X = Reference._fields.index("x")
 X_DOT = Reference._fields.index("x_dot")
 
@@ -266,31 +260,13 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
 
 
 @compiled
-def sense(autopilots, i, message, reported, now_us):
-    """Own state of UAV ``i`` from its vehicle's message (13,) and the command that it reports in force (4,).
-
-    ``reported`` comes as fractions of the travel and is overwritten in rad and N.
-    """
-    decode_command(reported, autopilots.travel[i], reported)
-    decode_state(message, now_us / 1e6, reported, autopilots.own[i])
-
-
-@compiled
 def aim(autopilots, i, target, controls):
     """The command of UAV ``i`` as an attitude target (5,), and what the vehicle reads of it, in fractions of travel."""
     own = autopilots.own[i]
-    V, gamma, chi = own[4], own[5], own[6]
+    V, gamma, chi = own[_V], own[_GAMMA], own[_CHI]
     encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], target)
     decode_target(target, V, gamma, chi, autopilots.travel[i], autopilots.code[i], controls)
     encode_command(controls, autopilots.travel[i], controls)
-
-
-@compiled
-def sense_all(autopilots, active, messages, reported, now_us):
-    """The first stage of a tick of all ``active``."""
-    for i in range(active.shape[0]):
-        if active[i] == 1:
-            sense(autopilots, i, messages[i], reported[i], now_us)
 
 
 @compiled

@@ -1,78 +1,70 @@
-"""The records that the UAVs of a process exchange: with each other directly, with everybody else over the mesh.
+"""The records that the UAVs of a process exchange with those of other processes, over the mesh.
 
-In lockstep it also knows for whom a tick must wait, and holds a sender back that would run ahead of those who hear it:
-acknowledgements travel with the hearers' own records.
+In lockstep it also keeps for whom the process waits, and how far it may run ahead of those who hear it:
+acknowledgements travel with the hearers' own transmissions.
 """
 
 from __future__ import annotations
 
-import collections
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
+import numpy as np
+
+from ftcc.airside.group import AutopilotGroup
 from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.exchange import Header, begin, new_transmission, octets_of, problem_text, take_in
 from ftcc.link.gate import Gate, Said
 from ftcc.link.mesh import Mesh
 from ftcc.link.process import Setting
-from ftcc.link.record import Record, RecordError
 
 __all__ = ["Neighbourhood"]
 
-_AHEAD = 4
-"""Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
-_NOTHING_MORE = 2**31 - 1
-"""Sequence number acknowledged by a UAV that hears nobody, or has ended."""
-
-
-class _Link:
-    """An in-edge as its receiver manages it."""
-
-    def __init__(self) -> None:
-        self.pending: collections.deque[Record] = collections.deque()
-        """Records that are not due yet."""
-        self.newest = -1
-        """Sequence number of the newest record received."""
-        self.ended = False
-        """The sender has ended: nothing more will come."""
+_EVERYTHING = 2**31 - 1
+"""Number of the transmission that somebody has of whom nothing more will come, or is wanted."""
+_MOST_RECORDS = 256
+"""In a transmission."""
 
 
 class Neighbourhood:
-    """Who hears whom among and around the UAVs of a process."""
+    """The other processes that fly neighbours of this one's UAVs; they are called by the ids of their first UAVs."""
 
-    def __init__(self, specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
-        self._specs = specs
-        self._timing = setting.timing
+    def __init__(self, specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate, group: AutopilotGroup) -> None:
         self._gate = gate
-        self._own = {spec.uav for spec in specs}
-        self._links = [{n.uav: _Link() for n in spec.neighbours} for spec in specs]
-        self._acknowledged: dict[int, int] = {}
-        """Lockstep: what each hearer outside this process has acknowledged."""
-        self._complete = -1
-        """Lockstep: all records up to this sequence number are here."""
-        self._bad_records = 0
-        self._mesh = self._open_mesh(setting)
+        self._group = group
+        self._peer_of = setting.peer_of
+        self._bad = 0
+        own = {spec.uav for spec in specs}
+        senders = {setting.peer_of[n.uav] for spec in specs for n in spec.neighbours if n.uav not in own}
+        hearers = {setting.peer_of[uav] for spec in specs for uav in spec.hearers if uav not in own}
+        linked = senders | hearers
+        self._newest = dict.fromkeys(senders, -1)
+        """Number of the last transmission of each process that is heard."""
+        self._acknowledged = dict.fromkeys(hearers, -1)
+        """Number up to which each hearing process has this one's."""
+        self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
+        self._mesh: Mesh | None = None
+        if linked:
+            # A peer listens on the port of its process's first UAV; of two peers the later one connects.
+            me = specs[0].uav
+            connect = [setting.ports[peer].mesh for peer in sorted(linked) if peer < me]
+            listen = setting.ports[me].mesh if any(peer > me for peer in linked) else None
+            # In lockstep an edge is subscribed to at both ends, for the acknowledgements.
+            hears, heard_by = (linked, linked) if setting.lockstep else (senders, hearers)
+            self._mesh = Mesh(setting.swarm, me, hears, heard_by, listen, connect, setting.lockstep)
+        self._count()
 
-    def _open_mesh(self, setting: Setting) -> Mesh | None:
-        """The process's peer, or None if all its neighbours are in this very process."""
-        senders = {(spec.uav, n.uav) for spec in self._specs for n in spec.neighbours if n.uav not in self._own}
-        hearers = {(spec.uav, uav) for spec in self._specs for uav in spec.hearers if uav not in self._own}
-        if not senders and not hearers:
-            return None
-        linked = {uav for _, uav in senders | hearers}
-        hears = {uav for _, uav in senders}
-        if setting.lockstep:
-            # An edge is subscribed to at both ends, for the acknowledgements.
-            self._acknowledged = {uav: -1 for _, uav in hearers}
-            hears, hearers = linked, hearers | senders
-        # A peer listens on the port of its process's first UAV; of two peers the later one connects.
-        me = self._specs[0].uav
-        peers = {setting.peer_of[uav] for uav in linked}
-        connect = [setting.ports[peer].mesh for peer in sorted(peers) if peer < me]
-        listen = setting.ports[me].mesh if any(peer > me for peer in peers) else None
-        return Mesh(setting.swarm, self._own, hears, hearers, listen, connect, setting.lockstep)
+    def fileno(self) -> int:
+        """Descriptor that can be read where the mesh has brought something; -1 without one."""
+        return self._mesh.fileno() if self._mesh else -1
+
+    @property
+    def mail(self) -> np.ndarray:
+        """(1,): 1 where the mesh has brought something."""
+        return self._mesh.mail if self._mesh else np.zeros(1, np.int64)
 
     @property
     def ready(self) -> bool:
-        """Whether all who hear this process's UAVs have subscribed."""
+        """Whether all who hear this process have subscribed."""
         return self._mesh is None or self._mesh.ready
 
     @property
@@ -80,77 +72,60 @@ class Neighbourhood:
         """Whose subscription is still awaited, as text."""
         return ", ".join(self._mesh.awaited) if self._mesh else ""
 
-    def publish(self, record: Record) -> None:
-        """Give a record to all who hear its sender."""
-        self._sort(record)
+    def publish(self) -> None:
+        """Put what the group has to say to other processes on the mesh."""
         if self._mesh:
-            self._mesh.publish(record.uav, record.pack())
+            self._mesh.publish(octets_of(self._group.transmission))
+        self._group.transmission.used[0] = 0
+
+    def end(self) -> None:
+        """Say that nothing more will come: nobody must wait for this process."""
+        transmission = self._group.transmission
+        begin(transmission, _EVERYTHING, _EVERYTHING, 1, self._group.autopilots.shared.shape[1])
+        self.publish()
 
     def take(self) -> None:
-        """Take in what the mesh has brought; what is no record is counted and reported once."""
-        if self._mesh is None:
+        """Take in what the mesh has brought; what is no transmission is counted and reported once."""
+        if self._mesh:
+            for sender, payload in self._mesh.receive():
+                self._take_in(sender, payload)
+        self._count()
+
+    def _take_in(self, sender: int, payload: bytes) -> None:
+        incoming = self._incoming
+        words, rest = divmod(len(payload), 8)
+        if rest or words > len(incoming.words):
+            self._complain(f"{len(payload)} bytes are no transmission")
             return
-        for payload in self._mesh.receive():
-            try:
-                record = Record.unpack(payload)
-            except RecordError as error:
-                self._bad_records += 1
-                if self._bad_records == 1:
-                    self._gate.tell(Said("warning", f"mesh: {error}"))
-                continue
-            self._sort(record)
-            if record.uav in self._acknowledged:
-                self._acknowledged[record.uav] = _NOTHING_MORE if record.last else record.heard
+        incoming.words[:words] = np.frombuffer(payload, "<i8")
+        incoming.used[0] = words
+        problem = take_in(incoming, self._group.exchange)
+        if problem:
+            self._complain(problem_text(problem, incoming))
+            return
+        header = Header(*incoming.words[: len(Header._fields)].tolist())
+        if sender in self._newest:
+            self._newest[sender] = header.number
+        if sender in self._acknowledged:
+            self._acknowledged[sender] = header.heard
 
-    def _sort(self, record: Record) -> None:
-        for links in self._links:
-            link = links.get(record.uav)
-            if link is None:
-                continue
-            if record.last:
-                link.ended = True
-            elif record.sequence > link.newest:
-                link.newest = record.sequence
-                link.pending.append(record)
+    def _complain(self, text: str) -> None:
+        self._bad += 1
+        if self._bad == 1:
+            self._gate.tell(Said("warning", f"mesh: {text}"))
 
-    def due(self, i: int, now_us: int) -> Iterator[tuple[int, Record]]:
-        """The records for UAV ``i`` whose latency has passed, each with the index of its in-edge."""
-        for edge, link in enumerate(self._links[i].values()):
-            while link.pending and link.pending[0].stamp_us + self._timing.latency_us <= now_us:
-                yield edge, link.pending.popleft()
+    def _count(self) -> None:
+        """Tell the compiled flight up to which number everything is here and acknowledged, but for who has died."""
+        gone = {self._peer_of[uav] for uav in self._gate.gone}
+        newest = [number for peer, number in self._newest.items() if peer not in gone]
+        acknowledged = [number for peer, number in self._acknowledged.items() if peer not in gone]
+        self._group.complete[0] = min(newest, default=_EVERYTHING)
+        self._group.acknowledged[0] = min(acknowledged, default=_EVERYTHING)
 
-    def missing(self, tick: int, alive: Sequence[int]) -> str:
-        """Lockstep: what a tick of the UAVs ``alive`` (indices) still needs of the mesh, as text; empty if nothing."""
-        if self._mesh is None:
-            return ""
-        due = tick * self._timing.period_us - self._timing.latency_us
-        needed = due // self._timing.exchange_us if due >= 0 else -1
-        tells = tick % self._timing.exchange_every == 0
-        if needed == self._complete and not tells:
-            return ""
-        self.take()
-        for sender, link in self._outside(alive):
-            if link.newest < needed:
-                return f"record {needed} of UAV {sender}"
-        self._complete = needed
-        if tells:
-            window = _AHEAD - (-self._timing.latency_us // self._timing.exchange_us)
-            awaited = tick // self._timing.exchange_every - window
-            for hearer, heard in self._acknowledged.items():
-                if heard < awaited and hearer not in self._gate.gone:
-                    return f"UAV {hearer} to acknowledge record {awaited}"
-        return ""
-
-    def heard(self, alive: Sequence[int]) -> int:
-        """Sequence number up to which the UAVs ``alive`` have received everything from outside this process."""
-        return min((link.newest for _, link in self._outside(alive)), default=_NOTHING_MORE)
-
-    def _outside(self, alive: Sequence[int]) -> Iterator[tuple[int, _Link]]:
-        """In-edges from living senders in other processes."""
-        for i in alive:
-            for sender, link in self._links[i].items():
-                if sender not in self._own and not link.ended and sender not in self._gate.gone:
-                    yield sender, link
+    def missing(self) -> str:
+        """Whose transmissions or acknowledgements are the oldest, as text."""
+        oldest = sorted((number, peer) for peer, number in {**self._acknowledged, **self._newest}.items())
+        return ", ".join(f"UAV {peer}" for number, peer in oldest if number == oldest[0][0])
 
     def close(self) -> None:
         """Leave the mesh."""

@@ -1,8 +1,8 @@
-"""One tick of an autopilot: the stages between what was received and what is sent. A template, see `link.compiled`.
+"""The stages of an autopilot's tick: sense, hear, refer, control, tell. A template, see `link.compiled`.
 
 The free name ``scheme`` is the module of the control law, ``references`` that of what its UAVs refer to by themselves.
-`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`, in the
-autopilot process and in the single-process simulation.
+`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`: `flight`
+puts them together for the autopilot process, ``groundside.flight_loop`` for the simulation in a single process.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ from __future__ import annotations
 from typing import Any
 
 from ftcc.airside.autopilots import lead
-from ftcc.airside.flight_path import Own
+from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard
-from ftcc.link.actuators import encode_command
-from ftcc.link.channel import hear
+from ftcc.link.actuators import decode_command
+from ftcc.link.channel import hear as hear_inbox
 from ftcc.link.compiled import compiled, copy, fields, store, width
+from ftcc.link.exchange import deliver, post
 from ftcc.link.modes import HOLD
 
-__all__ = ["SWEEPS", "announce", "anticipate", "control", "hear_and_control", "refer"]
+__all__ = ["SWEEPS", "announce", "anticipate", "control", "hear", "refer", "sense", "tell"]
 
 if "scheme" not in globals():
     raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
@@ -79,8 +80,31 @@ else:
 
 
 @compiled
-def refer(autopilots, i, now_us, period_us):
-    """Bring what UAV ``i`` refers to by itself to this tick; once at every tick. In hold it stands still."""
+def sense(autopilots, i, state, reported, now_us):
+    """Own state of UAV ``i`` from its vehicle's messages (13,) and the command that it reports in force (4,).
+
+    ``reported`` comes as fractions of the travel and is overwritten in rad and N.
+    """
+    decode_command(reported, autopilots.travel[i], reported)
+    decode_state(state, now_us / 1e6, reported, autopilots.own[i])
+
+
+@compiled
+def hear(exchange, inbox, events, timing, i, now_us):
+    """Take the records that are due for UAV ``i`` through the channels of its in-edges."""
+    deliver(exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
+    hear_inbox(inbox, i, now_us)
+
+
+@compiled
+def refer(autopilots, inbox, i, now_us, period_us):
+    """Bring what UAV ``i`` tracks to this tick, once at every tick: a leader's profile, a follower's own reference.
+
+    To be called after `hear`: a profile may wait for the position of another leader. In hold it stands still.
+    """
+    if autopilots.leader[i] == 1:
+        lead(autopilots, inbox, i, now_us, period_us)
+        return
     if autopilots.mode[i] == HOLD:
         if _stand(autopilots.reference[i], period_us):
             autopilots.held_us[i] += period_us
@@ -114,7 +138,7 @@ def anticipate(autopilots, inbox, i, dt):
 
 @compiled
 def control(autopilots, inbox, i, dt):
-    """Step the law of UAV ``i``: sets state, command, shared values and signals.
+    """Step the law of follower ``i``: sets state, command, shared values and signals.
 
     Shared values and signals belong to the instant of the measurement. Returns False, and leaves the command as it was,
     if the law gives a command that is not finite.
@@ -142,19 +166,6 @@ def control(autopilots, inbox, i, dt):
 
 
 @compiled
-def hear_and_control(autopilots, inbox, active, controls, ok, now_us, period_us):
-    """The later stages of a tick of all ``active``: inbox, then the leaders' profiles or the followers' law.
-
-    Followers' commands are written to ``controls`` as fractions of travel (k, 4). ``ok`` (k,) tells whose command is
-    finite.
-    """
-    for i in range(active.shape[0]):
-        if active[i] == 1:
-            ok[i] = 1
-            hear(inbox, i, now_us)
-            if autopilots.leader[i] == 1:
-                lead(autopilots, inbox, i, now_us, period_us)
-            else:
-                refer(autopilots, i, now_us, period_us)
-                ok[i] = 1 if control(autopilots, inbox, i, period_us / 1e6) else 0
-                encode_command(autopilots.command[i], autopilots.travel[i], controls[i])
+def tell(autopilots, exchange, events, i, sequence, now_us):
+    """Say what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
+    post(exchange, i, sequence, now_us, events.radio_on[i], autopilots.shared[i])

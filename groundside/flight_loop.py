@@ -6,23 +6,30 @@ of the plant. `simulate.loop_of` fills them in.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import lead, sense
-from ftcc.airside.link_events import set_links
-from ftcc.link.actuators import as_sent, decode_command, encode_command
-from ftcc.link.attitude_target import decode_target, encode_target
-from ftcc.link.channel import admit, hear, report_link
+from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.autopilots import build as build_autopilots
+from ftcc.airside.flight_path import Own
+from ftcc.airside.link_events import LinkEvents, link_events, set_links
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS, as_sent, decode_command, encode_command
+from ftcc.link.attitude_target import TARGET, decode_target, encode_target
+from ftcc.link.channel import LINK_REPORT, Inbox, report_link
 from ftcc.link.compiled import compiled, copy, fill
-from ftcc.sim.navigation import navigate
+from ftcc.link.exchange import Exchange, new_exchange, newest_slot
+from ftcc.link.timing import Timing
+from ftcc.link.wire import STATE
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import DIVERGED, X, Z, latch
-from ftcc.sim.sensors import encode_state
+from ftcc.sim.plant import DIVERGED, TRUTH, Fleet, X, Z, latch
+from ftcc.sim.spec import VehicleSpec
+from ftcc.sim.spec import build as build_vehicles
 
-__all__ = ["HISTORY", "Ether", "Recording", "fly"]
+__all__ = ["Recording", "World", "fly", "new_recording", "new_world"]
 
 if "tick" not in globals() or "cycle" not in globals():
     raise ImportError("ftcc.groundside.flight_loop is a template: use ftcc.groundside.simulate.loop_of")
@@ -33,34 +40,24 @@ cycle: Any = globals()["cycle"]
 _announce = tick.announce
 _anticipate = tick.anticipate
 _control = tick.control
-_SWEEPS = tick.SWEEPS
+_hear = tick.hear
 _refer = tick.refer
+_sense = tick.sense
+_tell = tick.tell
+_SWEEPS = tick.SWEEPS
 _actuate = cycle.actuate
 _truth = cycle.truth
 _measure = cycle.measure
+_state_of = cycle.sense
 _advance = cycle.advance
 _conditions = cycle.conditions
 
-HISTORY = 64
-"""Records kept of each sender."""
+_OWN_COMMAND = Own._fields.index("aileron")
+"""Where the command in force begins in `Own`."""
+_V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
 
 _SETTLED = 1e-6
 """Exchanges of one instant end when no shared value moves by more, in its unit."""
-
-
-class Ether(NamedTuple):
-    """What stands in for the mesh: the last records of every UAV."""
-
-    sender: NDArray[np.int64]
-    """(k, n): index of the UAV behind each in-edge."""
-    sent: NDArray[np.int64]
-    """(k,): records sent."""
-    stamp: NDArray[np.int64]
-    """(k, HISTORY): us."""
-    radio_on: NDArray[np.int64]
-    """(k, HISTORY)."""
-    values: NDArray[np.float64]
-    """(k, HISTORY, m)."""
 
 
 class Recording(NamedTuple):
@@ -84,188 +81,233 @@ class Recording(NamedTuple):
     """(k,): when."""
 
 
-class Scratch(NamedTuple):
-    """Room for one tick's work."""
+def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple[int, int]) -> Recording:
+    """An empty recording of ``rows`` ticks and ``reports`` on the links.
 
+    ``widths`` are the numbers of columns of truth, commands, what acts, conditions and signals, ``edges`` the numbers
+    of UAVs and of the in-edges that each has at most.
+    """
+    k = edges[0]
+    return Recording(
+        *(np.full((rows, k, width), np.nan) for width in widths),
+        links=np.full((reports, *edges, len(LINK_REPORT)), np.nan),
+        lost=np.zeros(k, np.int64),
+        lost_us=np.zeros(k, np.int64),
+    )
+
+
+class World(NamedTuple):
+    """A whole swarm in one process: all that a flight works on."""
+
+    fleet: Fleet
+    autopilots: Autopilots
+    inbox: Inbox
+    events: LinkEvents
+    exchange: Exchange
+    recording: Recording
     true: NDArray[np.float64]
-    """(k, 13)."""
+    """(k, 13): the states of this tick."""
     seen: NDArray[np.float64]
-    """(13,)."""
-    message: NDArray[np.float64]
-    """(13,)."""
+    """(13,): room for one as measured."""
+    state: NDArray[np.float64]
+    """(13,): room for one as a message carries it."""
     controls: NDArray[np.float64]
-    """(4,)."""
+    """(4,): room for a command as a message carries it."""
     target: NDArray[np.float64]
-    """(5,): see ``link.attitude_target.TARGET``."""
+    """(5,): room for an attitude target."""
+
+
+def new_world(
+    vehicles: Sequence[VehicleSpec], specs: Sequence[AutopilotSpec], timing: Timing, conditions: int
+) -> World:
+    """The swarm before the first tick; only the simulator knows ``conditions`` numbers of each vehicle."""
+    autopilots, inbox = build_autopilots(specs, timing)
+    uavs = [spec.uav for spec in specs]
+    senders = [[neighbour.uav for neighbour in spec.neighbours] for spec in specs]
+    signals, values = autopilots.signals.shape[1], autopilots.shared.shape[1]
+    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, signals)
+    rows, reports = timing.ticks // timing.record_every + 1, timing.ticks // timing.report_every + 1
+    return World(
+        fleet=build_vehicles(vehicles),
+        autopilots=autopilots,
+        inbox=inbox,
+        events=link_events(specs),
+        exchange=new_exchange(uavs, senders, inbox.valid.shape[1], values),
+        recording=new_recording(rows, reports, widths, inbox.valid.shape),
+        true=np.zeros((len(uavs), len(TRUTH))),
+        seen=np.zeros(len(TRUTH)),
+        state=np.zeros(len(STATE)),
+        controls=np.zeros(len(ACTUATORS)),
+        target=np.zeros(len(TARGET)),
+    )
 
 
 @compiled
-def _send(ether, autopilots, events, i, now):
-    slot = ether.sent[i] % HISTORY
-    ether.stamp[i, slot] = now
-    ether.radio_on[i, slot] = events.radio_on[i]
-    copy(autopilots.shared[i], ether.values[i, slot])
-    ether.sent[i] += 1
+def fly(world, timing, wire, first, last):
+    """Fly the ticks first..last-1.
+
+    With ``wire``, states and commands pass through the messages' float32, records through the mesh's latency, and a
+    command acts one sample after its measurement, as between processes; without, the exchange is ideal.
+    """
+    for n in range(first, last):
+        set_links(world.events, world.inbox, n * timing.period_us)
+        if wire:
+            _tick_by_wire(world, timing, n)
+        else:
+            _ideal_tick(world, timing, n)
+        _record(world, timing, n)
+        _fly_on(world, timing, n)
 
 
 @compiled
-def _receive(ether, inbox, events, i, now, latency, seed):
-    for edge in range(inbox.degree[i]):
-        sender = ether.sender[i, edge]
-        while inbox.edges[i, edge, 3] < ether.sent[sender]:
-            sequence = inbox.edges[i, edge, 3]
-            slot = sequence % HISTORY
-            stamp = ether.stamp[sender, slot]
-            if stamp + latency > now:
-                break
-            radio_on = ether.radio_on[sender, slot] == 1 and events.radio_on[i] == 1
-            admit(inbox, i, edge, sequence, stamp, radio_on, ether.values[sender, slot], latency, now, seed)
-    hear(inbox, i, now)
+def _tick_by_wire(world, timing, n):
+    """A tick as between processes."""
+    autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            if n > 0:
+                _bring_into_force(world, i)
+            _state_of(world.fleet, i, n, now, timing.seed, world.true[i], world.seen, world.state, world.controls)
+            _sense(autopilots, i, world.state, world.controls, now)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _refer(autopilots, inbox, i, now, timing.period_us)
+            _obey(world, timing, i, now)
+    if now % timing.exchange_us == 0:
+        for i in range(lost.shape[0]):
+            if lost[i] == 0:
+                _tell(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
 
 
 @compiled
-def _settle(ether, autopilots, inbox, lost, now, dt):
+def _ideal_tick(world, timing, n):
+    """A tick with an ideal exchange: all sense, then all share, then all step; a command acts at once."""
+    autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
+    for i in range(lost.shape[0]):
+        if lost[i] > 0:
+            continue
+        fleet, true = world.fleet, world.true[i]
+        _truth(fleet, i, now / 1e6, true)
+        watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[X], true[Z])
+        _measure(fleet, i, n, timing.seed, true, world.seen)
+        own = autopilots.own[i]
+        own[0] = now / 1e6
+        copy(world.seen, own[1:])
+        copy(fleet.command[i], own[_OWN_COMMAND:])
+        if autopilots.leader[i] == 1:
+            # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+        _refer(autopilots, inbox, i, now, timing.period_us)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            if autopilots.leader[i] == 0:
+                _announce(autopilots, inbox, i)
+            _tell(autopilots, world.exchange, world.events, i, world.exchange.count[i], now)
+    if _SWEEPS > 1:
+        for i in range(lost.shape[0]):
+            if lost[i] == 0 and autopilots.leader[i] == 0:
+                _hear(world.exchange, inbox, world.events, timing, i, now)
+        _settle(world, now, timing.period_us / 1e6)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0 and autopilots.leader[i] == 0:
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _obey(world, timing, i, now)
+    for i in range(lost.shape[0]):
+        if _flies(world.recording, i, now):
+            if autopilots.leader[i] == 1:
+                copy(autopilots.target[i], world.fleet.target[i])
+            else:
+                latch(world.fleet, i, autopilots.command[i])
+            _actuate(world.fleet, i, now / 1e6)
+
+
+@compiled
+def _flies(recording, i, now):
+    """Whether the vehicle of UAV ``i`` flies on from ``now``: it does so, too, where only its law has failed now."""
+    return recording.lost[i] == 0 or (recording.lost[i] == DIVERGED and recording.lost_us[i] == now)
+
+
+@compiled
+def _bring_into_force(world, i):
+    """The last command, as a message carries it."""
+    fleet, autopilots = world.fleet, world.autopilots
+    if autopilots.leader[i] == 1:
+        copy(autopilots.target[i], fleet.target[i])
+        as_sent(fleet.target[i, 1:])
+        return
+    if fleet.code[i, 0] > 0.0:
+        own = autopilots.own[i]
+        V, gamma, chi = own[_V], own[_GAMMA], own[_CHI]
+        encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], world.target)
+        decode_target(world.target, V, gamma, chi, fleet.travel[i], fleet.code[i], world.controls)
+    else:
+        encode_command(autopilots.command[i], autopilots.travel[i], world.controls)
+        decode_command(world.controls, fleet.travel[i], world.controls)
+    latch(fleet, i, world.controls)
+
+
+@compiled
+def _obey(world, timing, i, now):
+    """The law of a follower; where its command is not finite the UAV is lost."""
+    if world.autopilots.leader[i] == 1:
+        return
+    if not _control(world.autopilots, world.inbox, i, timing.period_us / 1e6):
+        world.recording.lost[i] = DIVERGED
+        world.recording.lost_us[i] = now
+        fill(world.autopilots.signals[i], np.nan)
+
+
+@compiled
+def _settle(world, now, dt):
     """Repeat the ideal exchange of this instant until the shared values have settled, all at once each time.
 
     For a law whose shared values depend on what it hears of the same instant: an algebraic loop around the graph.
     """
+    exchange, autopilots, inbox, lost = world.exchange, world.autopilots, world.inbox, world.recording.lost
     for _ in range(_SWEEPS - 1):
         moved = 0.0
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
                 _anticipate(autopilots, inbox, i, dt)
-                last = ether.values[i, (ether.sent[i] - 1) % HISTORY]
+                last = exchange.values[i, newest_slot(exchange, i)]
                 for m in range(last.shape[0]):
                     moved = max(moved, abs(autopilots.shared[i, m] - last[m]))
                 copy(autopilots.shared[i], last)
         for i in range(lost.shape[0]):
             for edge in range(inbox.degree[i]):
                 if inbox.stamp[i, edge] == now:
-                    sender = ether.sender[i, edge]
-                    copy(ether.values[sender, (ether.sent[sender] - 1) % HISTORY], inbox.values[i, edge])
+                    row = exchange.sender[i, edge]
+                    copy(exchange.values[row, newest_slot(exchange, row)], inbox.values[i, edge])
         if moved <= _SETTLED:
             break
 
 
 @compiled
-def _latch(fleet, autopilots, i, wire, buffer, target):
-    """Bring the last command into force."""
-    if autopilots.leader[i] == 1:
-        copy(autopilots.target[i], fleet.target[i])
-        if wire:
-            as_sent(fleet.target[i, 1:])
-    elif wire and fleet.code[i, 0] > 0.0:
-        own = autopilots.own[i]
-        V, gamma, chi = own[4], own[5], own[6]
-        encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], target)
-        decode_target(target, V, gamma, chi, fleet.travel[i], fleet.code[i], buffer)
-        latch(fleet, i, buffer)
-    elif wire:
-        encode_command(autopilots.command[i], autopilots.travel[i], buffer)
-        decode_command(buffer, fleet.travel[i], buffer)
-        latch(fleet, i, buffer)
-    else:
-        latch(fleet, i, autopilots.command[i])
+def _record(world, timing, n):
+    """A row of each UAV that flies, and one on each of its in-edges, where they are due."""
+    recording, fleet, now = world.recording, world.fleet, n * timing.period_us
+    every, report_every = timing.record_every, max(1, round(1e6 / timing.period_us))
+    for i in range(recording.lost.shape[0]):
+        if n % every == 0 and _flies(recording, i, now):
+            row = n // every
+            copy(world.true[i], recording.truth[row, i])
+            copy(fleet.command[i], recording.command[row, i])
+            copy(fleet.acting[i], recording.acting[row, i])
+            _conditions(fleet, i, now / 1e6, recording.conditions[row, i])
+            copy(world.autopilots.signals[i], recording.signals[row, i])
+        if n % report_every == 0 and recording.lost[i] == 0:
+            for edge in range(world.inbox.degree[i]):
+                report_link(world.inbox, i, edge, recording.links[n // report_every, i, edge])
 
 
 @compiled
-def fly(
-    fleet,
-    autopilots,
-    inbox,
-    events,
-    ether,
-    recording,
-    scratch,
-    period,
-    exchange,
-    latency,
-    step,
-    every,
-    report_every,
-    seed,
-    wire,
-    first,
-    last,
-):
-    """Fly the ticks first..last-1.
-
-    Periods are in us, ``every`` is the number of ticks between recorded rows, ``report_every`` between those on
-    the links. With ``wire``, states and commands pass
-    through the messages' float32 and a command acts one sample after its measurement, as between processes; without,
-    the exchange is ideal: all share, then all step, and the command acts at once.
-    """
-    k = fleet.state.shape[0]
-    true, seen, message, buffer = scratch.true, scratch.seen, scratch.message, scratch.controls
-    for n in range(first, last):
-        now = n * period
-        set_links(events, inbox, now)
-        for i in range(k):
-            if recording.lost[i] > 0:
-                continue
-            if wire:
-                if n > 0:
-                    _latch(fleet, autopilots, i, wire, buffer, scratch.target)
-                _actuate(fleet, i, now / 1e6)
-            _truth(fleet, i, now / 1e6, true[i])
-            watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[i, X], true[i, Z])
-            _measure(fleet, i, n, seed, true[i], seen)
-            if wire:
-                encode_state(seen, message)
-                navigate(fleet, i, now / 1e6, message)
-                # The vehicle reports the command in force as it received it.
-                encode_command(fleet.command[i], fleet.travel[i], buffer)
-                sense(autopilots, i, message, buffer, now)
-            else:
-                autopilots.own[i, 0] = now / 1e6
-                copy(seen, autopilots.own[i, 1:])
-                copy(fleet.command[i], autopilots.own[i, 14:])
-            if autopilots.leader[i] == 1:
-                # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
-                _receive(ether, inbox, events, i, now, latency, seed)
-                lead(autopilots, inbox, i, now, period)
-            else:
-                _refer(autopilots, i, now, period)
-        if not wire:
-            for i in range(k):
-                if recording.lost[i] == 0:
-                    if autopilots.leader[i] == 0:
-                        _announce(autopilots, inbox, i)
-                    _send(ether, autopilots, events, i, now)
-            if _SWEEPS > 1:
-                for i in range(k):
-                    if recording.lost[i] == 0 and autopilots.leader[i] == 0:
-                        _receive(ether, inbox, events, i, now, latency, seed)
-                _settle(ether, autopilots, inbox, recording.lost, now, period / 1e6)
-        for i in range(k):
-            if recording.lost[i] == 0 and autopilots.leader[i] == 0:
-                _receive(ether, inbox, events, i, now, latency, seed)
-                if not _control(autopilots, inbox, i, period / 1e6):
-                    recording.lost[i] = DIVERGED
-                    recording.lost_us[i] = now
-                    fill(autopilots.signals[i], np.nan)
-        if wire and now % exchange == 0:
-            for i in range(k):
-                if recording.lost[i] == 0:
-                    _send(ether, autopilots, events, i, now)
-        for i in range(k):
-            diverged_now = recording.lost[i] == DIVERGED and recording.lost_us[i] == now
-            if recording.lost[i] > 0 and not diverged_now:
-                continue
-            if not wire:
-                _latch(fleet, autopilots, i, wire, buffer, scratch.target)
-                _actuate(fleet, i, now / 1e6)
-            if n % every == 0:
-                row = n // every
-                copy(true[i], recording.truth[row, i])
-                copy(fleet.command[i], recording.command[row, i])
-                copy(fleet.acting[i], recording.acting[row, i])
-                _conditions(fleet, i, now / 1e6, recording.conditions[row, i])
-                copy(autopilots.signals[i], recording.signals[row, i])
-            if n % report_every == 0 and recording.lost[i] == 0:
-                for edge in range(inbox.degree[i]):
-                    report_link(inbox, i, edge, recording.links[n // report_every, i, edge])
-            why = _advance(fleet, i, now, period, step)
+def _fly_on(world, timing, n):
+    """Fly the vehicles for one period; one that leaves its model is lost."""
+    now, recording = n * timing.period_us, world.recording
+    for i in range(recording.lost.shape[0]):
+        if _flies(recording, i, now):
+            why = _advance(world.fleet, i, now, timing.period_us, timing.step_us)
             if why > 0 and recording.lost[i] == 0:
                 recording.lost[i] = why
-                recording.lost_us[i] = now + period
+                recording.lost_us[i] = now + timing.period_us

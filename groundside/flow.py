@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, Literal
@@ -24,7 +25,7 @@ class Flow:
     Parameters
     ----------
     period : control period, s.
-    speed : simulated seconds per second; of no meaning in ``lockstep``.
+    speed : simulated seconds per second, at most; inf, in ``lockstep``: as fast as possible.
     held : start held before tick 0.
     tell : says something to all processes.
     flying : names of the vehicle processes that still fly.
@@ -106,18 +107,24 @@ class Flow:
         Raises
         ------
         FlowError
-            In lockstep, which has no pace.
+            If it is none that the swarm's clock can keep.
         """
-        if self.lockstep:
-            raise FlowError("a swarm in lockstep (--speed max) has no pace that could be changed")
+        if math.isinf(speed) and not self.lockstep:
+            raise FlowError("a swarm on the wall clock has a speed; as fast as possible flies a swarm in lockstep")
         self.speed = speed
-        if self.state == "flying":
+        if self.state != "flying":
+            return
+        if self.lockstep:
+            # Nobody knows how far the swarm has come: each goes on from where it is, and waits for the others.
+            self._pace = Pace(time.monotonic() + START, None, speed)
+        else:
             # From one tick on that is due soon, the same for all.
+            begun = self._pace.tick or 0
             ahead = (time.monotonic() + START - self._pace.wall) * self._pace.speed / self.period
-            tick = self._pace.tick + max(0, int(ahead))
-            due = self._pace.wall + (tick - self._pace.tick) * self.period / self._pace.speed
+            tick = begun + max(0, int(ahead))
+            due = self._pace.wall + (tick - begun) * self.period / self._pace.speed
             self._pace = Pace(due, tick, speed)
-            self._tell(self._pace)
+        self._tell(self._pace)
 
     def _require_held(self, what: str) -> None:
         if self.state != "held":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import threading
@@ -25,8 +26,10 @@ from ftcc.link.recording import EventLog
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
 
-__all__ = ["FlightOptions", "Viewer", "fly"]
+__all__ = ["Clock", "FlightOptions", "Viewer", "fly"]
 
+Clock = Literal["lockstep", "wall"]
+"""What a tick waits for: for everybody, then for the wall clock; or for the wall clock alone."""
 Viewer = Literal["web", "native", "none"]
 """Where a swarm is shown."""
 
@@ -41,8 +44,10 @@ class FlightOptions:
     """How to fly, as opposed to what."""
 
     folder: Path
-    lockstep: bool = False
+    lockstep: bool = True
+    """All wait for each other; otherwise each flies by the wall clock."""
     speed: float = 1.0
+    """Simulated seconds per second, at most; inf: as fast as the computer can."""
     pack: int = 1
     held: bool = False
     viewer: Viewer = "none"
@@ -232,7 +237,7 @@ def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[s
     match command:
         case "status":
             t = flow.tick * flow.period if flow.state == "held" else flight.station.t
-            return {"state": flow.state, "t": t, "speed": None if flow.lockstep else flow.speed}
+            return {"state": flow.state, "t": t, "speed": None if math.isinf(flow.speed) else flow.speed}
         case "stop":
             flight.swarm.stop()
         case "pause":
@@ -244,8 +249,9 @@ def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[s
             flow.resume()
             text = "resumed"
         case "speed":
-            flow.set_speed(float(arguments["factor"]))
-            text = f"speed {flow.speed:g}"
+            factor = arguments["factor"]
+            flow.set_speed(math.inf if factor is None else float(factor))
+            text = "speed max" if factor is None else f"speed {flow.speed:g}"
         case _:
             raise ValueError(f"unknown command {command!r}")
     if text:

@@ -108,8 +108,8 @@ class Swarm:
     mission : the resolved scenario.
     folder : the run's folder.
     ports : a reserved block.
-    lockstep : wait for each other instead of for the clock.
-    speed : simulated seconds per second in real time.
+    lockstep : wait for each other, and for the clock; otherwise for the clock alone.
+    speed : simulated seconds per second, at most; inf: as fast as possible, in lockstep.
     pack : vehicles per process.
     held : stay at the first tick until `resume`.
     listeners : where other ground stations may listen.

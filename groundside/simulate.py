@@ -13,14 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.autopilots import tick_of, told
-from ftcc.airside.link_events import link_events
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run
 from ftcc.groundside.table import write_table
-from ftcc.link.actuators import ACTUATORS, in_slots
-from ftcc.link.attitude_target import TARGET
+from ftcc.link.actuators import in_slots
 from ftcc.link.channel import LINK_REPORT
 from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.happenings import drained
@@ -28,7 +25,6 @@ from ftcc.link.recording import LINK_COLUMNS, EventLog
 from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import conditions_of, cycle_of, find
-from ftcc.sim.spec import build as build_vehicles
 
 __all__ = ["Flight", "PlainPython", "fly", "loop_of", "record", "simulate"]
 
@@ -148,36 +144,6 @@ def loop_of(scheme: str, plant: str) -> ModuleType:
     return loop
 
 
-def _arrays(mission: Mission, loop: ModuleType, rows: int) -> tuple[Any, ...]:
-    """Everything that the compiled loop works on, before the first tick."""
-    autopilots, inbox = build_autopilots(mission.autopilots, mission.timing)
-    k = len(mission.uavs)
-    sender = np.zeros(inbox.valid.shape, np.int64)
-    for i, spec in enumerate(mission.autopilots):
-        sender[i, : len(spec.neighbours)] = [mission.uavs.index(neighbour.uav) for neighbour in spec.neighbours]
-    ether = loop.Ether(
-        sender=sender,
-        sent=np.zeros(k, np.int64),
-        stamp=np.zeros((k, loop.HISTORY), np.int64),
-        radio_on=np.zeros((k, loop.HISTORY), np.int64),
-        values=np.zeros((k, loop.HISTORY, mission.scheme.shared_width)),
-    )
-    conditions = len(conditions_of(mission.plant))
-    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, len(mission.scheme.signals))
-    reports = mission.timing.ticks // mission.timing.report_every + 1
-    recording = loop.Recording(
-        *(np.full((rows, k, width), np.nan) for width in widths),
-        links=np.full((reports, *inbox.valid.shape, len(LINK_REPORT)), np.nan),
-        lost=np.zeros(k, np.int64),
-        lost_us=np.zeros(k, np.int64),
-    )
-    scratch = loop.Scratch(
-        np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(ACTUATORS)), np.zeros(len(TARGET))
-    )
-    events = link_events(mission.autopilots)
-    return build_vehicles(mission.vehicles), autopilots, inbox, events, ether, recording, scratch
-
-
 def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], None] | None = None) -> Flight:
     """Fly a mission in memory.
 
@@ -193,19 +159,8 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     loop = loop_of(mission.scheme.name, mission.plant)
     if loop.tick.REFUSAL:
         warnings.warn(loop.tick.REFUSAL, PlainPython, stacklevel=2)
-    rows = timing.ticks // timing.record_every + 1
-    arrays = _arrays(mission, loop, rows)
-    constants = (
-        timing.period_us,
-        timing.exchange_us,
-        timing.latency_us,
-        timing.step_us,
-        timing.record_every,
-        timing.report_every,
-        timing.seed,
-        mission.wire,
-    )
-    loop.fly(*arrays, *constants, 0, 0)
+    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)))
+    loop.fly(world, timing, mission.wire, 0, 0)
     if ready is not None:
         ready()
     end = timing.ticks + 1
@@ -215,15 +170,15 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     events: list[tuple[float, int, str, str]] = []
     while flown < end and not interrupted:
         try:
-            loop.fly(*arrays, *constants, flown, min(end, flown + chunk))
-            events += _happened(mission, *arrays[:2])
+            loop.fly(world, timing, mission.wire, flown, min(end, flown + chunk))
+            events += _happened(mission, world.fleet, world.autopilots)
             flown = min(end, flown + chunk)
             if progress is not None:
                 progress((flown - 1) * timing.period)
         except KeyboardInterrupt:
             # What has been flown is recorded; a shorter flight than was asked for is not hidden.
             interrupted = True
-    recording = arrays[5]
+    recording = world.recording
     rows = (flown - 1) // timing.record_every + 1 if flown else 0
     return Flight(
         mission=mission,

@@ -69,8 +69,8 @@ class Codec:
         self.not_signed = 0
         """Messages dropped because they were not signed, wrongly signed or repeated."""
 
-    def pack(self, *messages: Any) -> bytes:
-        """``messages`` as one datagram.
+    def pack(self, *messages: Any, sequence: int | None = None) -> bytes:
+        """``messages`` as one datagram, numbered from ``sequence`` on, or from where the last one ended.
 
         Raises
         ------
@@ -78,6 +78,8 @@ class Codec:
             If a float in one of them is nan, inf or beyond float32: such a value would be believed on the other side.
         """
         datagram = bytearray()
+        if sequence is not None:
+            self._mav.seq = sequence
         for message in messages:
             if not _finite(message):
                 raise ValueError(f"{message.get_type()} holds a value that is not finite: {message}")

@@ -29,7 +29,9 @@ __all__ = [
     "Vector",
     "cache_folder",
     "compiled",
+    "compiled_to_wait",
     "copy",
+    "external",
     "fields",
     "fill",
     "instantiate",
@@ -37,6 +39,7 @@ __all__ = [
     "refusal",
     "store",
     "uncompile",
+    "when_compiled",
     "width",
 ]
 
@@ -93,9 +96,36 @@ def compiled(function: F) -> F:
     No fast-math and no fused multiply-add: compiled and plain Python give the same bits. Compiled functions work on
     arrays that they are given and allocate none: without reference counting a flight is three times as fast.
     """
+    return _compiled(function)
+
+
+def compiled_to_wait(function: F) -> F:
+    """As `compiled`, for a function that waits for sockets: other threads of Python run meanwhile."""
+    return _compiled(function, nogil=True)
+
+
+def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
-    return numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False, **options)(function)  # type: ignore[no-any-return]
+
+
+def external(name: str, result: str, *arguments: str) -> Any:
+    """The function ``name`` of the C library for compiled code; types by numba's names, such as "int32".
+
+    Compiled functions that call it are cached: its address is looked up when they are loaded.
+    """
+    return types.ExternalFunction(name, getattr(types, result)(*(getattr(types, one) for one in arguments)))
+
+
+def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:
+    """Decorates what stands for ``function`` where compiled code calls it; with plain Python ``function`` is called."""
+
+    def register(substitute: F) -> F:
+        overload(function, strict=False)(lambda *arguments: substitute)
+        return substitute
+
+    return register
 
 
 def refusal(function: Any, *arguments: Any) -> str:

@@ -39,7 +39,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class Ended:
-    """Process -> launcher: all ticks flown or stopped, recording flushed; ``late`` and ``skipped`` ticks."""
+    """Process -> launcher: all ticks flown or stopped, recording flushed; ``late`` of all ``ticks`` of its UAVs."""
 
     tick: int
     late: int = 0
@@ -74,7 +74,8 @@ class Pace:
     """Launcher -> vehicle: tick ``tick`` is due at ``wall`` (monotonic clock, s), later ticks at ``speed``."""
 
     wall: float
-    tick: int
+    tick: int | None
+    """None: the next one, whichever that is."""
     speed: float
 
 
@@ -127,6 +128,7 @@ class Gate:
     gone: set[int] = field(default_factory=set)
     stopping: bool = False
     released: bool = False
+    _new_pace: Pace | None = None
     _held: int | None = None
     """The tick at which this process has said that it is held."""
 
@@ -159,8 +161,9 @@ class Gate:
         match message:
             case Go(pace, limit):
                 self.pace, self.limit = pace, limit.tick
+                self._new_pace = pace
             case Pace():
-                self.pace = message
+                self.pace = self._new_pace = message
             case Limit(tick):
                 self.limit, self._held = tick, None
             case Gone(uav):
@@ -170,14 +173,10 @@ class Gate:
             case Release():
                 self.released = True
 
-    def due(self, tick: int, period: float) -> float:
-        """Wall-clock time (monotonic, s) at which a tick of ``period`` seconds is due."""
-        assert self.pace is not None
-        return self.pace.wall + (tick - self.pace.tick) * period / self.pace.speed
-
-    def open(self, tick: int) -> bool:
-        """Whether the swarm may pass this tick."""
-        return self.limit is None or tick <= self.limit
+    def take_pace(self) -> Pace | None:
+        """The pace, if it has changed since the last call."""
+        pace, self._new_pace = self._new_pace, None
+        return pace
 
     def hold(self, tick: int) -> None:
         """Say, once, that the limit holds this process before a tick."""

@@ -8,7 +8,6 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftcc.link.codec import Codec, dialect
 
@@ -20,19 +19,11 @@ __all__ = [
     "STATION",
     "Endpoint",
     "as_typed",
-    "attitude_message",
-    "command_message",
     "dialect",
     "ending_message",
     "ends",
     "float_array",
-    "read_attitude",
-    "read_command",
-    "read_state",
-    "read_target",
-    "state_messages",
     "status_text",
-    "target_message",
 ]
 
 AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
@@ -49,19 +40,6 @@ _DATAGRAMS_PER_READ = 64
 _LARGEST_DATAGRAM = 4096
 _LARGEST = 3.4e38
 """What float32 can hold."""
-_UNUSED_CONTROLS = (0.0,) * 12
-_NO_RATES = (
-    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
-    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
-    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
-)
-_POSITION_AND_VELOCITY = (
-    dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
-    | dialect.POSITION_TARGET_TYPEMASK_AY_IGNORE
-    | dialect.POSITION_TARGET_TYPEMASK_AZ_IGNORE
-    | dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
-    | dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
-)
 
 
 class Endpoint:
@@ -90,7 +68,10 @@ class Endpoint:
         only: Collection[int] | None = None,
         host: str = LOOPBACK,
     ) -> None:
+        self.system, self.component = system, component
         self.codec = Codec(system, component)
+        self.sequence = np.zeros(1, np.int64)
+        """(1,): sequence number of the next message; shared with whoever else sends by this socket."""
         self._only = frozenset((LOOPBACK, port) for port in only) if only is not None else None
         self.strangers = 0
         """Datagrams dropped because of where they came from."""
@@ -99,7 +80,6 @@ class Endpoint:
         self._socket.bind((host, port))
         if peer is not None:
             self._socket.connect(peer)
-        self._last: bytes = b""
 
     def fileno(self) -> int:
         """For ``select``."""
@@ -121,25 +101,25 @@ class Endpoint:
         ValueError
             If a float in one of them is nan, inf or beyond float32: such a value would be believed on the other side.
         """
-        self._last = self.codec.pack(*messages)
-        self._put(self._last)
-
-    def send_aside(self, *messages: Any) -> None:
-        """Send ``messages`` in one datagram of which `send_again` takes no notice."""
-        self._put(self.codec.pack(*messages))
-
-    def send_again(self) -> None:
-        """Send the last datagram once more, e.g. because its answer is late."""
-        if self._last:
-            self._put(self._last)
-
-    def _put(self, datagram: bytes) -> None:
+        datagram = self.pack(*messages)
         try:
             self._socket.send(datagram)
         except ConnectionRefusedError:
             return  # The peer is not there (yet, or any more); whoever waits for its answer notices.
         except BlockingIOError:
             return  # The buffer is full: lost, as a datagram may be.
+
+    def pack(self, *messages: Any) -> bytes:
+        """``messages`` as one datagram, with the next sequence numbers.
+
+        Raises
+        ------
+        ValueError
+            As `send`.
+        """
+        datagram = self.codec.pack(*messages, sequence=int(self.sequence[0]))
+        self.sequence[0] = (int(self.sequence[0]) + len(messages)) % 256
+        return datagram
 
     def receive(self, datagrams: int = _DATAGRAMS_PER_READ) -> list[Any]:
         """The messages of the next ``datagrams``, in order; bad data and non-finite values are dropped and counted."""
@@ -156,106 +136,6 @@ class Endpoint:
                 continue
             messages += self.codec.parse(datagram)
         return messages
-
-
-def state_messages(stamp_us: int, state: NDArray[np.float64], controls: NDArray[np.float64] | None) -> tuple[Any, ...]:
-    """What a vehicle tells its autopilot at every tick: attitude and position, and what is in force.
-
-    ``state`` (13,) holds the fields of the two state messages. ``controls`` (4,), the command in force as fractions of
-    travel, is told where it is not the one that answers the last state, which the autopilot knows; otherwise None.
-    """
-    stamp = stamp_us // 1000
-    v = state.tolist()
-    attitude = dialect.MAVLink_attitude_quaternion_message(stamp, v[0], v[1], v[2], v[3], v[4], v[5], v[6])
-    position = dialect.MAVLink_local_position_ned_message(stamp, v[7], v[8], v[9], v[10], v[11], v[12])
-    if controls is None:
-        return attitude, position
-    return attitude, position, command_message(stamp_us, controls)
-
-
-def read_state(messages: Sequence[Any], state: NDArray[np.float64], controls: NDArray[np.float64]) -> tuple[int, int]:
-    """The inverse of `state_messages`, from the beginning of ``messages``.
-
-    Fills ``state``, and ``controls`` where they were told.
-
-    Returns
-    -------
-    stamp, used : int
-        The stamp in us, or -1 if the messages do not begin with a state; the number of messages that belong to it.
-    """
-    if len(messages) < 2:
-        return -1, 1
-    a, p = messages[0], messages[1]
-    if a.get_type() != "ATTITUDE_QUATERNION" or p.get_type() != "LOCAL_POSITION_NED":
-        return -1, 1
-    if a.time_boot_ms != p.time_boot_ms:
-        return -1, 2
-    state[:] = (a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
-    stamp = int(a.time_boot_ms) * 1000
-    if len(messages) > 2 and read_command(messages[2], controls) == stamp:
-        return stamp, 3
-    return stamp, 2
-
-
-def command_message(stamp_us: int, controls: NDArray[np.float64]) -> Any:
-    """Actuator command, fractions of travel in the order of ``ACTUATORS``, answering the state of that stamp."""
-    return dialect.MAVLink_hil_actuator_controls_message(stamp_us, (*controls.tolist(), *_UNUSED_CONTROLS), 0, 0)
-
-
-def read_command(message: Any, controls: NDArray[np.float64]) -> int:
-    """The inverse of `command_message`: the stamp in us, or -1 for another message."""
-    if message.get_type() != "HIL_ACTUATOR_CONTROLS":
-        return -1
-    controls[:] = message.controls[:4]
-    return int(message.time_usec)
-
-
-def target_message(system: int, target: NDArray[np.float64]) -> Any:
-    """A leader's target (stamp s, x, y, z, vx, vy, vz; z up) for its reference point; z down on the wire."""
-    t, x, y, z, vx, vy, vz = target.tolist()
-    return dialect.MAVLink_set_position_target_local_ned_message(
-        round(t * 1e3),
-        system,
-        SIMULATOR,
-        dialect.MAV_FRAME_LOCAL_NED,
-        _POSITION_AND_VELOCITY,
-        x,
-        y,
-        -z,
-        vx,
-        vy,
-        -vz,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
-
-
-def attitude_message(stamp_us: int, system: int, target: NDArray[np.float64]) -> Any:
-    """An attitude target, see `attitude_target`, answering the state of that stamp."""
-    q1, q2, q3, q4, thrust = target.tolist()
-    return dialect.MAVLink_set_attitude_target_message(
-        stamp_us // 1000, system, SIMULATOR, _NO_RATES, (q1, q2, q3, q4), 0.0, 0.0, 0.0, thrust
-    )
-
-
-def read_attitude(message: Any, target: NDArray[np.float64]) -> int:
-    """The inverse of `attitude_message`: the stamp in us, or -1 for another message."""
-    if message.get_type() != "SET_ATTITUDE_TARGET":
-        return -1
-    target[:] = (*message.q, message.thrust)
-    return int(message.time_boot_ms) * 1000
-
-
-def read_target(message: Any, target: NDArray[np.float64]) -> int:
-    """The inverse of `target_message`: the stamp in us, or -1 for another message."""
-    if message.get_type() != "SET_POSITION_TARGET_LOCAL_NED":
-        return -1
-    m = message
-    target[:] = (m.time_boot_ms / 1e3, m.x, m.y, -m.z, m.vx, m.vy, -m.vz)
-    return int(m.time_boot_ms) * 1000
 
 
 def ending_message() -> Any:

@@ -1,109 +1,143 @@
 """The mesh: one Zenoh peer per process, linked along the edges of the communication graph and to nobody else.
 
-No multicast, no gossip, no router, loopback unless told otherwise. In real time a ring keeps the newest records; in
-lockstep a queue keeps every record, in order. Both are polled: a callback per record would cost a thread switch each.
+No multicast, no gossip, no router, loopback only. A process puts one transmission on the mesh per exchange and
+subscribes to those processes whose UAVs its own hear. What arrives is kept by Zenoh's thread, which writes to a pipe:
+so a process sleeps until it arrives, on the mesh and on its sockets at once.
 """
 
 from __future__ import annotations
 
+import collections
 import json
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from ftcc.link.mavlink import LOOPBACK
 
 __all__ = ["Mesh"]
 
 _RING = 16
-"""Records kept of each sender in real time."""
-_QUEUE = 1024
-"""Records kept of each sender in lockstep; a sender is held back long before that."""
+"""Transmissions kept of each sender in real time."""
+
+_RUNTIME = "(" + ", ".join(f"{pool}: (handover: app)" for pool in ("acc", "rx", "tx", "net")) + ")"
+"""One thread of Zenoh's for all its work: handing a record from one to the other costs more than sending it."""
 
 
 class Mesh:
-    """The peer of a process that flies the UAVs ``own``.
+    """The peer of the process ``own``; processes are called by the ids of their first UAVs.
 
     Parameters
     ----------
     swarm : str
         Name of the run; part of every key, so that two swarms never mix.
-    own : ids of this process's UAVs.
-    hears : ids of other processes' UAVs whose records are wanted.
-    heard_by : pairs (own UAV, other process's UAV that hears it); the peer is ready when all of them have subscribed.
+    own : name of this process.
+    hears : names of the processes whose transmissions are wanted.
+    heard_by : names of those that want this one's; the peer is ready when all of them have subscribed.
     listen : port of this peer, or None if nobody connects to it.
     connect : ports of the peers to connect to.
-    ordered : deliver every record in order (lockstep) instead of the newest ones (real time).
+    ordered : deliver every transmission in order (lockstep) instead of the newest ones (real time).
     """
 
     def __init__(
         self,
         swarm: str,
-        own: Iterable[int],
+        own: int,
         hears: Iterable[int],
-        heard_by: Iterable[tuple[int, int]],
+        heard_by: Iterable[int],
         listen: int | None,
         connect: Iterable[int],
         ordered: bool,
     ) -> None:
+        os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
         import zenoh  # after the fork: a child of a process that had opened Zenoh never sends
 
         self._zenoh = zenoh
-        self._prefix = f"ftcc/{swarm}"
-        self._awaited = {f"{self._prefix}/{hearer}/hears/{uav}" for uav, hearer in heard_by}
-        self._session = zenoh.open(_configuration(zenoh, listen, connect))
-        self._subscribers: list[Any] = []
-        self._tokens: list[Any] = []
+        prefix = f"ftcc/{swarm}"
         hears = list(hears)
-        own = list(own)
-        for uav in hears:
-            handler: Any = zenoh.handlers.FifoChannel(_QUEUE) if ordered else zenoh.handlers.RingChannel(_RING)
-            self._subscribers.append(
-                self._session.declare_subscriber(
-                    f"{self._prefix}/{uav}/shared", handler, allowed_origin=zenoh.Locality.REMOTE
-                )
-            )
-        self._publishers = {
-            uav: self._session.declare_publisher(
-                f"{self._prefix}/{uav}/shared", congestion_control=zenoh.CongestionControl.BLOCK, express=True
-            )
-            for uav in own
+        self._awaited = {f"{prefix}/{hearer}/hears/{own}" for hearer in heard_by}
+        self._arrived: dict[int, collections.deque[bytes]] = {
+            sender: collections.deque(maxlen=None if ordered else _RING) for sender in hears
         }
+        self._bell, self._button = os.pipe()
+        self._rung = False
+        for end in (self._bell, self._button):
+            os.set_blocking(end, False)
+        self.mail = np.zeros(1, np.int64)
+        """(1,): 1 where something has arrived since the last `receive`; compiled code looks here between two ticks."""
+        self._session = zenoh.open(_configuration(zenoh, listen, connect))
+        self._subscribers = [
+            self._session.declare_subscriber(
+                f"{prefix}/{sender}/shared", self._keeper(sender), allowed_origin=zenoh.Locality.REMOTE
+            )
+            for sender in hears
+        ]
+        self._publisher = self._session.declare_publisher(
+            f"{prefix}/{own}/shared", congestion_control=zenoh.CongestionControl.BLOCK, express=True
+        )
         self._liveliness = self._session.liveliness().declare_subscriber(
-            f"{self._prefix}/*/hears/*", self._greeted, history=True
+            f"{prefix}/*/hears/{own}", self._greeted, history=True
         )
         # A token says "my subscription stands"; the sender waits for it before the flight.
-        for uav in own:
-            for sender in hears:
-                self._tokens.append(self._session.liveliness().declare_token(f"{self._prefix}/{uav}/hears/{sender}"))
+        self._tokens = [self._session.liveliness().declare_token(f"{prefix}/{own}/hears/{sender}") for sender in hears]
+
+    def _keeper(self, sender: int) -> Callable[[Any], None]:
+        """What Zenoh's thread does with a sample of ``sender``: keep it, and ring."""
+        arrived = self._arrived[sender]
+
+        def keep(sample: Any) -> None:
+            arrived.append(bytes(sample.payload))
+            self.mail[0] = 1
+            if not self._rung:
+                self._rung = True
+                os.write(self._button, b".")
+
+        return keep
 
     def _greeted(self, sample: Any) -> None:
         if sample.kind == self._zenoh.SampleKind.PUT:
             self._awaited.discard(str(sample.key_expr))
 
+    def fileno(self) -> int:
+        """For ``select``: can be read where something has arrived since the last `receive`."""
+        return self._bell
+
     @property
     def ready(self) -> bool:
-        """Whether all who hear this process's UAVs have subscribed."""
+        """Whether all who hear this process have subscribed."""
         return not self._awaited
 
     @property
     def awaited(self) -> list[str]:
-        """Keys of the neighbours who have not subscribed yet."""
+        """Keys of those who have not subscribed yet."""
         return sorted(self._awaited)
 
-    def publish(self, uav: int, payload: bytes) -> None:
-        """Put a record of the process's UAV ``uav`` on the mesh."""
-        self._publishers[uav].put(payload)
+    def publish(self, payload: bytes) -> None:
+        """Put a transmission on the mesh."""
+        self._publisher.put(payload)
 
-    def receive(self) -> list[bytes]:
-        """The records that have arrived since the last call, those of one sender in order."""
-        return [bytes(sample.payload) for ring in self._subscribers for sample in iter(ring.try_recv, None)]
+    def receive(self) -> list[tuple[int, bytes]]:
+        """The transmissions that have arrived since the last call, with their senders; those of one in order."""
+        if self._rung:
+            # In this order: what arrives meanwhile rings again.
+            os.read(self._bell, 1)
+            self._rung = False
+        self.mail[0] = 0
+        received = []
+        for sender, arrived in self._arrived.items():
+            while arrived:
+                received.append((sender, arrived.popleft()))
+        return received
 
     def close(self) -> None:
-        """Drain and leave; closing with records unread would take seconds."""
-        self.receive()
-        for declared in (*self._tokens, self._liveliness, *self._subscribers, *self._publishers.values()):
+        """Leave the mesh."""
+        for declared in (*self._tokens, self._liveliness, *self._subscribers, self._publisher):
             declared.undeclare()
         self._session.close()
+        os.close(self._bell)
+        os.close(self._button)
 
 
 def _configuration(zenoh: Any, listen: int | None, connect: Iterable[int]) -> Any:

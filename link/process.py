@@ -58,11 +58,6 @@ class Setting:
         """MAVLink system id of a UAV towards the ground."""
         return uav + self.id_offset
 
-    @property
-    def datagrams(self) -> int:
-        """Datagrams to read at a time: one where one is awaited, all where the newest counts."""
-        return 1 if self.lockstep else 64
-
 
 class Waiter:
     """Waits for any of several sockets and pipes, and has what arrives handled."""
@@ -81,6 +76,10 @@ class Waiter:
             key.data()
         return bool(ready)
 
+    def fileno(self) -> int:
+        """A descriptor that can be read where one of them can."""
+        return self._selector.fileno()  # type: ignore[attr-defined,no-any-return]
+
     def close(self) -> None:
         self._selector.close()
 
@@ -89,7 +88,8 @@ class Telemetry:
     """When to report: at 10 Hz simulated or wall, whichever is slower, and at the end."""
 
     def __init__(self, timing: Timing) -> None:
-        self._every = max(1, round(_TELEMETRY / timing.period))
+        self.every = max(1, round(_TELEMETRY / timing.period))
+        """Ticks between two that may be reported."""
         self._end = timing.ticks
         self._last = -1e9
 
@@ -97,7 +97,7 @@ class Telemetry:
         """Whether telemetry is due at this tick."""
         if tick == self._end:
             return True
-        if tick % self._every:
+        if tick % self.every:
             return False
         now = time.monotonic()
         # A tenth of slack: a tick that comes a little early must not halve the rate.

@@ -12,14 +12,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.compiled import compiled
 
 __all__ = [
     "LINK_COLUMNS",
+    "ROWS",
     "SCHEMA_VERSION",
     "Column",
     "EventLog",
     "PartWriter",
+    "Recorder",
+    "Rows",
     "arrow_schema",
+    "is_full",
+    "new_rows",
     "part_path",
     "read_events",
     "read_part",
@@ -28,8 +36,13 @@ __all__ = [
 SCHEMA_VERSION = 1
 """Of parts, merged tables and event logs."""
 
-_ROWS = 500
+ROWS = 500
 """Rows in a record batch: 5 s at 100 Hz is what a killed process loses at most."""
+
+_SPARE = 256
+"""Rows beyond them, in which a tick surely finds room: one for each UAV that may be heard."""
+_FLUSH = 1.0
+"""Wall time after which rows are written though there is room for more, s."""
 
 _INTEGERS = ("uav", "sender")
 
@@ -76,6 +89,29 @@ def arrow_schema(columns: Iterable[Column], metadata: Mapping[str, str] | None =
     return pa.schema(fields, metadata={"ftcc.schema": str(SCHEMA_VERSION), **(metadata or {})})
 
 
+class Rows(NamedTuple):
+    """Rows that the k UAVs of a process have filled and that were not written yet."""
+
+    values: NDArray[np.float64]
+    """(k, ROWS and some to spare, c)."""
+    filled: NDArray[np.int64]
+    """(k,): rows in use."""
+
+
+@compiled
+def is_full(rows):
+    """Whether a UAV has filled its rows: they must be written before the next tick."""
+    most = 0
+    for i in range(rows.filled.shape[0]):
+        most = max(most, rows.filled[i])
+    return most >= ROWS
+
+
+def new_rows(uavs: int, columns: int) -> Rows:
+    """Room for `ROWS` rows of each UAV and those that a tick adds, empty."""
+    return Rows(np.zeros((uavs, ROWS + _SPARE, columns)), np.zeros(uavs, np.int64))
+
+
 class PartWriter:
     """Appends rows to an Arrow IPC stream, a batch at a time.
 
@@ -95,44 +131,64 @@ class PartWriter:
         self.columns = tuple(columns)
         self._schema = arrow_schema(self.columns)
         self._integer = [column.name in _INTEGERS for column in self.columns]
-        self._buffer = np.empty((_ROWS, len(self.columns)))
-        self._filled = 0
-        self._flushed = time.monotonic()
         self._file = self.path.open("wb", buffering=0)
         self._stream = pa.ipc.new_stream(self._file, self._schema)
 
-    def row(self, values: Sequence[float]) -> None:
-        """Append a row, in the order of the columns."""
-        self._buffer[self._filled] = values
-        self._filled += 1
-        if self._filled == _ROWS:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write what has been gathered as one batch."""
-        self._flushed = time.monotonic()
-        if self._filled == 0:
+    def write(self, rows: NDArray[np.float64]) -> None:
+        """Write rows (n, c), in the order of the columns, as one batch."""
+        if not len(rows):
             return
-        rows = self._buffer[: self._filled]
         arrays = [
             self._pa.array(rows[:, n].astype(np.int32) if integer else np.ascontiguousarray(rows[:, n]))
             for n, integer in enumerate(self._integer)
         ]
         self._stream.write_batch(self._pa.RecordBatch.from_arrays(arrays, schema=self._schema))
-        self._filled = 0
-
-    def flush_if_due(self) -> None:
-        """Flush what is older than a second of wall time."""
-        if time.monotonic() - self._flushed > 1.0:
-            self.flush()
 
     def close(self) -> None:
-        """Flush and end the stream; may be called twice."""
+        """End the stream; may be called twice."""
         if self._file.closed:
             return
-        self.flush()
         self._stream.close()
         self._file.close()
+
+
+class Recorder:
+    """The parts of the recording of a process's UAVs, each written from its `Rows`.
+
+    Parameters
+    ----------
+    paths : the file of each UAV; None: nothing is recorded of it.
+    columns : of all of them.
+    """
+
+    def __init__(self, paths: Sequence[Path | None], columns: Sequence[Column]) -> None:
+        self.rows = new_rows(len(paths), len(columns))
+        self._parts = {i: PartWriter(path, columns) for i, path in enumerate(paths) if path is not None}
+        self._written = time.monotonic()
+
+    def write(self) -> None:
+        """Write all rows that have been filled."""
+        self._written = time.monotonic()
+        for i, part in self._parts.items():
+            part.write(self.rows.values[i, : self.rows.filled[i]])
+        self.rows.filled[:] = 0
+
+    def write_if_full(self) -> None:
+        """Write where a UAV has filled its rows."""
+        if is_full(self.rows):
+            self.write()
+
+    def write_if_due(self) -> None:
+        """Write where rows have waited for a second of wall time, too."""
+        if time.monotonic() - self._written > _FLUSH:
+            self.write()
+        self.write_if_full()
+
+    def close(self) -> None:
+        """Write the rest and end the files."""
+        self.write()
+        for part in self._parts.values():
+            part.close()
 
 
 def read_part(path: Path) -> Any:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 __all__ = ["Timing"]
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Periods of a run; tick k is at time k * period."""
+class Timing(NamedTuple):
+    """Periods of a run; tick k is at time k * period. Compiled code reads the fields."""
 
     period_us: int
     """Control period."""

@@ -1,4 +1,4 @@
-"""Flight of the vehicles of a process between two datagrams, compiled. A template, see `link.compiled`.
+"""Flight of a vehicle between two datagrams, compiled. A template, see `link.compiled`.
 
 The free name ``plant`` is the module of the equations of motion. `plants.cycle_of` gives this module with a plant
 filled in.
@@ -17,7 +17,7 @@ from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturb
 from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 
-__all__ = ["actuate", "advance", "conditions", "fly_period", "measure", "report_state", "truth"]
+__all__ = ["actuate", "advance", "conditions", "measure", "sense", "truth"]
 
 if "plant" not in globals():
     raise ImportError("ftcc.sim.cycle is a template: use ftcc.sim.plants.cycle_of(plant)")
@@ -152,22 +152,15 @@ def measure(fleet, i, tick, seed, true, out):
 
 
 @compiled
-def report_state(fleet, alive, tick, now_us, seed, true, seen, messages, controls):
-    """Truth (k, 13), state messages (k, 13) and command in force (k, 4, fractions) of the living at this tick."""
-    for i in range(alive.shape[0]):
-        if alive[i] == 1:
-            actuate(fleet, i, now_us / 1e6)
-            truth(fleet, i, now_us / 1e6, true[i])
-            watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[i, X], true[i, Z])
-            measure(fleet, i, tick, seed, true[i], seen)
-            encode_state(seen, messages[i])
-            navigate(fleet, i, now_us / 1e6, messages[i])
-            encode_command(fleet.command[i], fleet.travel[i], controls[i])
+def sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
+    """Truth of vehicle ``i``, its state as the autopilot is told, and the command in force as fractions of travel.
 
-
-@compiled
-def fly_period(fleet, alive, now_us, period_us, step_us, why):
-    """Fly the living for one period; ``why`` (k,) is set to a key of ``plant.LOST``."""
-    for i in range(alive.shape[0]):
-        if alive[i] == 1:
-            why[i] = advance(fleet, i, now_us, period_us, step_us)
+    Written into ``true`` (13,), ``state`` (13,), see ``wire.STATE``, and ``controls`` (4,); ``seen`` (13,) is room.
+    """
+    actuate(fleet, i, now_us / 1e6)
+    truth(fleet, i, now_us / 1e6, true)
+    watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[X], true[Z])
+    measure(fleet, i, tick, seed, true, seen)
+    encode_state(seen, state)
+    navigate(fleet, i, now_us / 1e6, state)
+    encode_command(fleet.command[i], fleet.travel[i], controls)

@@ -18,7 +18,7 @@ from ftcc.sim.obstacles import Obstacle, zones_of
 from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards, Gust
 from ftcc.sim.plants import find
 
-__all__ = ["NO_AUTOTHROTTLE", "VehicleSpec", "build"]
+__all__ = ["NO_AUTOTHROTTLE", "VehicleSpec", "build", "placeholder"]
 
 NO_AUTOTHROTTLE = Autothrottle(0.0, 0.0, 0.0)
 
@@ -145,3 +145,25 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         for fault in sorted(planned, key=lambda fault: fault.time):
             inject(fleet, i, fault, -math.inf)
     return fleet
+
+
+def placeholder(plant: str) -> VehicleSpec:
+    """A vehicle that flies nowhere, to compile with."""
+    flown = find(plant)
+    return VehicleSpec(
+        uav=1,
+        kind="aircraft",
+        plant=plant,
+        airframe=(1.0,) * len(flown.Parameters._fields),
+        initial=(1.0,) * len(flown.State._fields),
+        command=(0.0,) * len(ACTUATORS),
+        limits=((0.0, 0.0),) * len(ACTUATORS),
+        lag=(0.0,) * len(ACTUATORS),
+        rate=(math.inf,) * len(ACTUATORS),
+        fault_before_lag=False,
+        faults=(),
+        disturbances=(),
+        noise=(0.0,) * len(TRUTH),
+        guards=Guards(*(0.0,) * len(Guards._fields)),
+        offset=0.0,
+    )

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.autopilots import Autopilots, build
-from ftcc.airside.link_events import link_events
+from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme
@@ -24,14 +23,13 @@ from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.groundside.simulate import loop_of
 from ftcc.link.actuators import ACTUATORS
-from ftcc.link.channel import LINK_REPORT, Channel, Inbox
+from ftcc.link.channel import Channel, Inbox
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim.airframe import Airframe
 from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.spec import VehicleSpec
-from ftcc.sim.spec import build as build_fleet
 
 AIRFRAME = Airframe(
     m=25.0, S=1.463, c=0.451, Iy=6.765, rho=1.205, g=9.8,
@@ -176,34 +174,9 @@ class Swarm:
             autopilot(uav, gains=gains, channel=self.channel, link_events=self.link_events.get(uav, ()))
             for uav in GRAPH.uavs
         ]
-        self.fleet = build_fleet(vehicles)
-        self.autopilots, self.inbox = build(specs, self.timing)
-        self.events = link_events(specs)
-        k, rows = len(specs), self.timing.ticks + 1
-        sender = np.zeros(self.inbox.valid.shape, np.int64)
-        for i, spec in enumerate(specs):
-            sender[i, : len(spec.neighbours)] = [GRAPH.uavs.index(n.uav) for n in spec.neighbours]
-        history = self.loop.HISTORY
-        self.ether = self.loop.Ether(
-            sender,
-            np.zeros(k, np.int64),
-            np.zeros((k, history), np.int64),
-            np.zeros((k, history), np.int64),
-            np.zeros((k, history, self.scheme.shared_width)),
-        )
-        self.recording = self.loop.Recording(
-            np.full((rows, k, len(TRUTH)), math.nan),
-            np.full((rows, k, len(ACTUATORS)), math.nan),
-            np.full((rows, k, len(ACTUATORS)), math.nan),
-            np.full((rows, k, len(conditions_of("longitudinal"))), math.nan),
-            np.full((rows, k, len(self.scheme.signals)), math.nan),
-            np.full((rows // self.timing.report_every + 1, *self.inbox.valid.shape, len(LINK_REPORT)), math.nan),
-            np.zeros(k, np.int64),
-            np.zeros(k, np.int64),
-        )
-        self._scratch = self.loop.Scratch(
-            np.zeros((k, len(TRUTH))), np.zeros(len(TRUTH)), np.zeros(13), np.zeros(4), np.zeros(5)
-        )
+        self.world = self.loop.new_world(vehicles, specs, self.timing, len(conditions_of("longitudinal")))
+        self.fleet, self.autopilots, self.inbox = self.world.fleet, self.world.autopilots, self.world.inbox
+        self.events, self.exchange, self.recording = self.world.events, self.world.exchange, self.world.recording
 
     @property
     def scheme(self) -> Scheme:
@@ -216,13 +189,8 @@ class Swarm:
 
     def fly(self, first: int = 0, last: int | None = None) -> Swarm:
         """Fly the ticks first..last-1, by default all."""
-        t = self.timing
-        self.loop.fly(
-            self.fleet, self.autopilots, self.inbox, self.events, self.ether, self.recording, self._scratch,
-            t.period_us, t.exchange_us, t.latency_us, t.step_us, t.record_every, t.report_every, t.seed,
-            self.form == "flight",
-            first, t.ticks + 1 if last is None else last,
-        )  # fmt: skip
+        end = self.timing.ticks + 1 if last is None else last
+        self.loop.fly(self.world, self.timing, self.form == "flight", first, end)
         return self
 
     @property

@@ -26,6 +26,8 @@ __all__ = ["Failures"]
 
 _PATIENCE = 0.2
 """Wall time that a vehicle has to answer, s."""
+_NEVER = 2**62
+"""Beyond every simulated time, us."""
 _FAILED = dialect.MAV_RESULT_FAILED
 
 
@@ -80,7 +82,7 @@ class Failures:
             return Answer(BUSY, "the vehicle has not answered the last one")
         sizes = [self._seat.sizes[size.name] for size in AIRFRAME_SIZES]
         asked = 0 if self._seat.at_ms == 0 else at_us
-        self._seat.vehicle.send_aside(*failure_messages(self._seat.spec.uav, meaning, instance, asked, sizes))
+        self._seat.vehicle.send(*failure_messages(self._seat.spec.uav, meaning, instance, asked, sizes))
         self._waiting = (request, meaning, instance, time.monotonic() + _PATIENCE)
         return None
 
@@ -108,6 +110,11 @@ class Failures:
             request = self._waiting[0]
             self._waiting = None
             self._link.answer(request, Answer(_FAILED, "the vehicle does not answer"))
+
+    @property
+    def next_us(self) -> int:
+        """When the next of what has been armed acts, simulated us."""
+        return self._armed[0][0] if self._armed else _NEVER
 
     def tell_what_acts(self, now_us: int) -> None:
         """Say of what has been armed that it acts, when its time has come."""

@@ -71,13 +71,16 @@ class GroundLink:
 
     def report(self, now_us: int) -> None:
         """After a tick: say what acts, and send the telemetry that is due."""
-        self.seat.now_us = now_us
-        self.seat.started = True
         self.failures.tell_what_acts(now_us)
         for peer, schedule in self._flows:
             due = schedule.due(now_us)
             if due and peer.there:
                 peer.send(*(STREAMS[n].make(self.seat) for n in due))
+
+    @property
+    def next_us(self) -> int:
+        """Simulated time before which there is nothing to `report`, unless the ground asks for something."""
+        return min([self.failures.next_us, *(schedule.next_us for _, schedule in self._flows)])
 
     def attend(self) -> None:
         """Between ticks, also while the swarm is held: HEARTBEAT, and what must not wait for ever."""

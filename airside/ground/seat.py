@@ -61,8 +61,8 @@ class Seat:
     vehicle: Endpoint
     tell: Callable[[Said], None]
     """Says something to the launcher."""
-    now_us: int = 0
-    """Simulated time of the last tick."""
+    done: NDArray[np.int64]
+    """(1,): its last tick; -1 before the first."""
     alive: bool = True
     sizes: dict[str, float] = field(default_factory=dict)
     """Parameters FAIL_*: how large the next failure is."""
@@ -74,8 +74,6 @@ class Seat:
     """Parameter SYS_FAILURE_EN."""
     fault_tolerance: bool = True
     """Parameter FTCC_FT."""
-    started: bool = False
-    """Whether there has been a tick."""
 
     def __post_init__(self) -> None:
         self.channel: Channel = self.spec.channel
@@ -92,9 +90,14 @@ class Seat:
         return Home(*self.setting.home)
 
     @property
+    def now_us(self) -> int:
+        """Simulated time of the last tick."""
+        return max(0, int(self.done[0])) * self.setting.timing.period_us
+
+    @property
     def next_us(self) -> int:
         """Simulated time of the next tick, the earliest at which anything can act."""
-        return self.now_us + self.setting.timing.period_us if self.started else 0
+        return (int(self.done[0]) + 1) * self.setting.timing.period_us
 
     def note(
         self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None

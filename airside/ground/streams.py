@@ -333,6 +333,11 @@ class Schedule:
         self._next_wall = 0.0
         """Nothing is due before these times, simulated us and wall s (monotonic)."""
 
+    @property
+    def next_us(self) -> int:
+        """Simulated time before which nothing is due."""
+        return self._next_us
+
     def set(self, n: int, rate: float) -> None:
         """Set the rate of stream ``n``, Hz; 0 = silent."""
         self._rates[n] = rate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -28,6 +29,7 @@ __all__ = [
     "new_run_folder",
     "show_claims",
     "show_summary",
+    "speed_factor",
     "terminal",
     "warn",
 ]
@@ -45,6 +47,7 @@ Settings = Annotated[
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a value of the scenario; repeatable."),
 ]
 
+_GREATEST_SPEED = 1000.0
 _PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables must not be folded into a file."""
 
@@ -70,6 +73,17 @@ def fail(text: str) -> NoReturn:
     """Bad input: one message, exit code 2."""
     _say(f"ftcc: {text}", "bold red")
     sys.exit(2)
+
+
+def speed_factor(text: str, name: str) -> float:
+    """Simulated seconds per second from the option or argument ``name``; inf for "max"."""
+    try:
+        factor = math.inf if text == "max" else float(text)
+    except ValueError:
+        factor = math.nan
+    if not (text == "max" or 0.0 < factor < _GREATEST_SPEED):
+        fail(f"{name} {text}: must be a positive factor below {_GREATEST_SPEED:g}, or 'max'")
+    return factor
 
 
 def load_scenario(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import sys
@@ -26,6 +27,7 @@ from ftcc.groundside.cli.common import (
     load_mission,
     new_run_folder,
     show_claims,
+    speed_factor,
 )
 
 if TYPE_CHECKING:
@@ -39,19 +41,6 @@ _LAST_SYSTEM = 239
 """Greatest MAVLink system id of a UAV."""
 
 _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
-
-
-def _speed(text: str) -> float | None:
-    """A factor, or None for "max" (lockstep)."""
-    if text == "max":
-        return None
-    try:
-        factor = float(text)
-    except ValueError:
-        fail(f"--speed {text}: must be a positive factor or 'max'")
-    if not 0.0 < factor < 1000.0:
-        fail(f"--speed {text}: must be a positive factor below 1000, or 'max'")
-    return factor
 
 
 def _pack(text: str, uavs: int) -> int:
@@ -105,7 +94,13 @@ def fly(
     seed: Seed = None,
     out: Out = None,
     settings: Settings = None,
-    speed: Annotated[str, typer.Option(help="Simulated seconds per second, or 'max': lockstep.")] = "1",
+    speed: Annotated[str, typer.Option(help="Simulated seconds per second, at most, or 'max'.")] = "1",
+    clock: Annotated[
+        str,
+        typer.Option(
+            help="lockstep: all wait for each other, a slow computer flies slower; wall: who is late, is late."
+        ),
+    ] = "lockstep",
     hold: Annotated[bool, typer.Option("--hold", help="Stay at t = 0 until `ftcc resume`.")] = False,
     viewer: Annotated[str, typer.Option(help="web, native or none.")] = "web",
     browser: Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")] = True,
@@ -121,9 +116,13 @@ def fly(
     ] = 0,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
-    from ftcc.groundside.fly import Viewer
+    from ftcc.groundside.fly import Clock, Viewer
 
-    factor = _speed(speed)
+    factor = speed_factor(speed, "--speed")
+    if clock not in get_args(Clock):
+        fail(f"--clock {clock}: must be one of {', '.join(get_args(Clock))}")
+    if clock == "wall" and math.isinf(factor):
+        fail("--clock wall --speed max: the wall clock needs a factor; as fast as possible flies --clock lockstep")
     if viewer not in get_args(Viewer):
         fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
     mission = load_mission(scenario, form, variant, settings, seed, duration)
@@ -147,8 +146,8 @@ def fly(
         fail(str(error))
     options = FlightOptions(
         folder=folder,
-        lockstep=factor is None,
-        speed=factor or 1.0,
+        lockstep=clock == "lockstep",
+        speed=factor,
         pack=count,
         held=hold,
         viewer=cast(Viewer, viewer),

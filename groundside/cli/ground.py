@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli.common import fail, terminal, warn
+from ftcc.groundside.cli.common import fail, speed_factor, terminal, warn
 
 if TYPE_CHECKING:
     from ftcc.groundside.station import Station
@@ -301,7 +301,7 @@ _HOLDING = 10.0
 """Wall time within which a swarm must be held, s."""
 
 
-def _tell(name: str | None, command: str, **arguments: float) -> None:
+def _tell(name: str | None, command: str, **arguments: float | None) -> None:
     from ftcc.groundside.registry import find, tell
 
     try:
@@ -350,13 +350,12 @@ def resume(name: _Name = None) -> None:
 
 
 def speed(
-    factor: Annotated[float, typer.Argument(help="Simulated seconds per second.")],
+    factor: Annotated[str, typer.Argument(help="Simulated seconds per second, or 'max'.")],
     swarm: Swarm = None,
 ) -> None:
     """Change how fast a swarm flies."""
-    if not 0.0 < factor < 1000.0:
-        fail(f"speed {factor:g}: must be a positive factor below 1000")
-    _tell(swarm, "speed", factor=factor)
+    wanted = speed_factor(factor, "speed")
+    _tell(swarm, "speed", factor=None if math.isinf(wanted) else wanted)
 
 
 # Keys.

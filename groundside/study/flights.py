@@ -94,7 +94,7 @@ def fly_all(
     )
     try:
         # Compiled once here, or by every process at the same time.
-        timing = dataclasses.replace(study.mission.timing, ticks=0)
+        timing = study.mission.timing._replace(ticks=0)
         fly(dataclasses.replace(study.mission, timing=timing))
         if ready is not None:
             ready()

@@ -84,7 +84,7 @@ class Study:
         mission = self.combinations[trial.combination].mission
         if mission is None:
             return None
-        timing = dataclasses.replace(mission.timing, seed=trial.seed)
+        timing = mission.timing._replace(seed=trial.seed)
         as_flown = tomli_w.dumps({**tomllib.loads(mission.toml), "seed": trial.seed})
         return dataclasses.replace(mission, timing=timing, toml=as_flown)
 
@@ -161,7 +161,7 @@ def _case(published: Scenario) -> tuple[Any, ...] | None:
 
 def _essence(mission: Mission) -> tuple[Any, ...]:
     """What makes a flight, but for its length and its chance."""
-    timing = dataclasses.replace(mission.timing, ticks=0, seed=0)
+    timing = mission.timing._replace(ticks=0, seed=0)
     return mission.scheme.name, mission.wire, timing, mission.graph.weights, mission.vehicles, mission.autopilots
 
 

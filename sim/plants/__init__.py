@@ -10,7 +10,7 @@ from types import ModuleType
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.link.compiled import instantiate
 
-__all__ = ["conditions_of", "cycle_of", "find", "name_of", "names"]
+__all__ = ["conditions_of", "cycle_of", "find", "flight_of", "name_of", "names"]
 
 _REQUIRED = ("State", "Inputs", "Disturbances", "Parameters")
 _LISTS = ("ACTUATORS", "COMPLETED", "DISTURBANCES", "SERVES", "START")
@@ -63,3 +63,8 @@ def conditions_of(plant: str) -> tuple[tuple[str, str], ...]:
 def cycle_of(plant: str) -> ModuleType:
     """The compiled flight of vehicles of that plant, see `cycle`."""
     return instantiate("ftcc.sim.cycle", plant, plant=find(plant))
+
+
+def flight_of(plant: str) -> ModuleType:
+    """The compiled flight of a process of vehicles of that plant, see `flight`."""
+    return instantiate("ftcc.sim.flight", plant, cycle=cycle_of(plant))

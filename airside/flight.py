@@ -1,0 +1,325 @@
+"""The flight of an autopilot process, compiled: from the states of its vehicles to the commands that answer them.
+
+A template, see `link.compiled`: the free name ``stages`` is the module `tick` for a scheme. `group.flight_of`
+gives this module with it filled in. `tick` lists the stages; the rest waits for what a tick needs. No stage reads a
+wall clock.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ftcc.airside.autopilots import aim
+from ftcc.airside.link_events import set_links
+from ftcc.link.actuators import encode_command
+from ftcc.link.channel import report_link
+from ftcc.link.compiled import compiled, compiled_to_wait, copy
+from ftcc.link.exchange import append, begin
+from ftcc.link.process import RESEND
+from ftcc.link.recording import is_full
+from ftcc.link.system_calls import monotonic, wait
+from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, MAIL, WORK
+from ftcc.link.wire import (
+    BY_ATTITUDE,
+    BY_POSITION,
+    is_readable,
+    read_state,
+    receive_datagram,
+    send_again,
+    send_attitude_target,
+    send_command,
+    send_position_target,
+)
+
+__all__ = ["fly_freely", "fly_in_lockstep", "take"]
+
+if "stages" not in globals():
+    raise ImportError("ftcc.airside.flight is a template: use ftcc.airside.group.flight_of(scheme)")
+
+stages: Any = globals()["stages"]
+
+_sense = stages.sense
+_hear = stages.hear
+_refer = stages.refer
+_control = stages.control
+_tell = stages.tell
+
+_DATAGRAMS = 64
+"""Read of one vehicle at a time, at most: a flood must not hold up the others for ever."""
+_LOOK = 20
+"""Longest wait before the clock is looked at, ms."""
+_AHEAD = 4
+"""Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
+
+
+@compiled
+def tick(group, timing, now_us):
+    """One tick of the autopilots that are ``active``."""
+    every = range(group.active.shape[0])
+    for i in every:
+        if group.active[i] == 1:
+            sense(group, i, now_us)
+    set_links(group.events, group.inbox, now_us)
+    for i in every:
+        if group.active[i] == 1:
+            hear(group, timing, i, now_us)
+            refer(group, timing, i, now_us)
+            control(group, timing, i, now_us)
+            actuate(group, i, now_us)
+    for i in every:
+        if group.active[i] == 1 and now_us % timing.exchange_us == 0:
+            tell(group, timing, i, now_us)
+    for i in every:
+        if group.active[i] == 1:
+            report(group, timing, i, now_us)
+
+
+@compiled
+def sense(group, i, now_us):
+    """The state that has come becomes the present one.
+
+    Where the vehicle does not say which command is in force, it is the one that answers its last state.
+    """
+    copy(group.arrived[i], group.states[i])
+    copy(group.arrived_controls[i] if group.told[i] == 1 else group.controls[i], group.reported[i])
+    group.pending[i] = -1
+    _sense(group.autopilots, i, group.states[i], group.reported[i], now_us)
+
+
+@compiled
+def hear(group, timing, i, now_us):
+    """The records that are due, through the channel into the inbox."""
+    _hear(group.exchange, group.inbox, group.events, timing, i, now_us)
+
+
+@compiled
+def refer(group, timing, i, now_us):
+    """What is tracked: a leader's profile, a follower's own reference."""
+    _refer(group.autopilots, group.inbox, i, now_us, timing.period_us)
+
+
+@compiled
+def control(group, timing, i, now_us):
+    """The law; a UAV whose command is not finite ends here."""
+    group.done[i] = now_us // timing.period_us
+    autopilots = group.autopilots
+    if autopilots.leader[i] == 1:
+        return
+    if _control(autopilots, group.inbox, i, timing.period_us / 1e6):
+        encode_command(autopilots.command[i], autopilots.travel[i], group.controls[i])
+    else:
+        group.active[i] = 0
+        group.alive[i] = 0
+        group.given_up[0] += 1
+
+
+@compiled
+def actuate(group, i, now_us):
+    """The command to the vehicle."""
+    if group.active[i] == 0:
+        return
+    wire, autopilots = group.wire, group.autopilots
+    if group.travels_by[i] == BY_POSITION:
+        sent = send_position_target(wire, i, autopilots.target[i])
+    elif group.travels_by[i] == BY_ATTITUDE:
+        aim(autopilots, i, group.target, group.controls[i])
+        sent = send_attitude_target(wire, i, now_us, group.target)
+    else:
+        sent = send_command(wire, i, now_us, group.controls[i])
+    if not sent:
+        group.unsendable[0] = 1
+
+
+@compiled
+def tell(group, timing, i, now_us):
+    """A record for the neighbours: here those in this process, with the next transmission the others."""
+    sequence = now_us // timing.exchange_us
+    _tell(group.autopilots, group.exchange, group.events, i, sequence, now_us)
+    if group.heard_outside[i] == 1:
+        if group.transmission.used[0] == 0:
+            begin(group.transmission, sequence, group.complete[0], 0, group.autopilots.shared.shape[1])
+        uav, radio_on = group.wire.system[i], group.events.radio_on[i]
+        if not append(group.transmission, uav, sequence, now_us, radio_on, group.autopilots.shared[i]):
+            group.unsendable[0] = 1
+
+
+@compiled
+def report(group, timing, i, now_us):
+    """A row of the recording, and one on each in-edge, where they are due."""
+    n = now_us // timing.period_us
+    rows, links = group.rows, group.link_rows
+    if n % timing.record_every == 0 and group.autopilots.leader[i] == 0:
+        row = rows.values[i, rows.filled[i]]
+        row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
+        copy(group.autopilots.signals[i], row[2:])
+        rows.filled[i] += 1
+    if n % max(1, round(1e6 / timing.period_us)) == 0:
+        for edge in range(group.inbox.degree[i]):
+            row = links.values[i, links.filled[i]]
+            row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
+            row[2] = float(group.inbox.edges[i, edge, 0])
+            report_link(group.inbox, i, edge, row[3:])
+            links.filled[i] += 1
+
+
+@compiled
+def something_to_do(group, now_us):
+    """Whether Python has something to do after this tick."""
+    if group.transmission.used[0] > 0 or group.autopilots.happenings.used[0] > 0 or now_us >= group.report_us[0]:
+        return True
+    if group.given_up[0] > 0 or group.unsendable[0] > 0:
+        return True
+    return is_full(group.rows) or is_full(group.link_rows)
+
+
+# Waiting for what a tick needs.
+
+
+@compiled
+def take(group, timing, i):
+    """Take in the datagram at hand for UAV ``i``; one that was answered already is answered once more."""
+    stamp, told = read_state(group.wire, group.arrived[i], group.arrived_controls[i])
+    if stamp < 0:
+        return DATAGRAM
+    n = stamp // timing.period_us
+    if n > group.done[i]:
+        group.pending[i], group.told[i] = n, told
+    elif n == group.done[i]:
+        send_again(group.wire, i)
+    return GO_ON
+
+
+@compiled
+def listen(group, timing):
+    """Read what the vehicles sent, until each has a state."""
+    for i in range(group.alive.shape[0]):
+        for _ in range(_DATAGRAMS):
+            if group.alive[i] == 0 or group.pending[i] >= 0 or not receive_datagram(group.wire, i):
+                break
+            cause = take(group, timing, i)
+            if cause != GO_ON:
+                return cause
+    return GO_ON
+
+
+@compiled
+def _look_around(group, first):
+    """Wait for the descriptors from row ``first`` of ``polled`` on; the cause if it is time for Python to look."""
+    wait(group.wire.polled[first:], _LOOK)
+    others = group.alive.shape[0]
+    if is_readable(group.wire, others) or monotonic(group.room) >= group.attention[0]:
+        return ATTEND
+    return GO_ON
+
+
+@compiled
+def _await_states(group, timing):
+    """Lockstep: wait until every living UAV has its state."""
+    while True:
+        cause = listen(group, timing)
+        if cause != GO_ON:
+            return cause
+        missing = 0
+        for i in range(group.alive.shape[0]):
+            if group.alive[i] == 1 and group.pending[i] < 0:
+                missing += 1
+        if missing == 0:
+            return GO_ON
+        now = monotonic(group.room)
+        if now - group.since[0] > RESEND:
+            group.since[0] = now
+            for i in range(group.alive.shape[0]):
+                if group.alive[i] == 1 and group.pending[i] < 0:
+                    send_again(group.wire, i)
+        mesh = group.alive.shape[0] + 1
+        descriptor = group.wire.polled[mesh, 0]
+        group.wire.polled[mesh, 0] = -1
+        cause = _look_around(group, 0)
+        group.wire.polled[mesh, 0] = descriptor
+        if cause != GO_ON:
+            return cause
+
+
+@compiled
+def records_are_here(group, timing, now_us):
+    """Lockstep: whether every record that could be usable is here, and nobody who hears this process is far behind."""
+    due = now_us - timing.latency_us
+    if due >= 0 and group.complete[0] < due // timing.exchange_us:
+        return False
+    window = _AHEAD - (-timing.latency_us // timing.exchange_us)
+    return now_us % timing.exchange_us != 0 or group.acknowledged[0] >= now_us // timing.exchange_us - window
+
+
+@compiled
+def _await_records(group, timing, now_us):
+    """Lockstep: sleep until the mesh has brought what this tick needs."""
+    if records_are_here(group, timing, now_us):
+        return GO_ON
+    if group.mail[0] == 0:
+        others = group.alive.shape[0]
+        cause = _look_around(group, others)
+        if cause != GO_ON:
+            return cause
+    return MAIL
+
+
+@compiled
+def _next_state(group):
+    """The earliest tick of which a state has come; -1: none."""
+    earliest = -1
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.pending[i] >= 0 and (earliest < 0 or group.pending[i] < earliest):
+            earliest = group.pending[i]
+    return earliest
+
+
+@compiled
+def _fly_tick(group, timing, n):
+    """Fly tick ``n`` of those whose state of it is here; whether Python has something to do then."""
+    for i in range(group.alive.shape[0]):
+        group.active[i] = 1 if group.alive[i] == 1 and group.pending[i] == n else 0
+    tick(group, timing, n * timing.period_us)
+    return something_to_do(group, n * timing.period_us)
+
+
+@compiled_to_wait
+def fly_in_lockstep(group, timing):
+    """Fly tick after tick, all at once, until Python has something to do; why, see `link.waiting`."""
+    while True:
+        if not group.alive.any():
+            return FLOWN
+        if monotonic(group.room) >= group.attention[0]:
+            return ATTEND
+        cause = _await_states(group, timing)
+        if cause != GO_ON:
+            return cause
+        n = _next_state(group)
+        cause = _await_records(group, timing, n * timing.period_us)
+        if cause != GO_ON:
+            return cause
+        work = _fly_tick(group, timing, n)
+        group.since[0] = monotonic(group.room)
+        if work:
+            return WORK
+
+
+@compiled_to_wait
+def fly_freely(group, timing):
+    """Work on the states of each vehicle as they come, with the newest records, until Python has something to do."""
+    while True:
+        if not group.alive.any():
+            return FLOWN
+        if monotonic(group.room) >= group.attention[0]:
+            return ATTEND
+        cause = listen(group, timing)
+        if cause != GO_ON:
+            return cause
+        if group.mail[0] == 1:
+            return MAIL
+        n = _next_state(group)
+        if n < 0:
+            cause = _look_around(group, 0)
+            if cause != GO_ON:
+                return cause
+        elif _fly_tick(group, timing, n):
+            return WORK

@@ -1,0 +1,142 @@
+"""The autopilots of a process as plain arrays: all that their compiled flight works on, from datagram to datagram."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.autopilots import Autopilots, build, tick_of
+from ftcc.airside.link_events import LinkEvents, link_events
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.attitude_target import TARGET
+from ftcc.link.channel import Inbox
+from ftcc.link.compiled import instantiate, uncompile
+from ftcc.link.exchange import Exchange, Transmission, new_exchange, new_transmission
+from ftcc.link.mavlink import AUTOPILOT
+from ftcc.link.recording import Rows
+from ftcc.link.timing import Timing
+from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, STATE, Wire, new_wire
+
+__all__ = ["AutopilotGroup", "build_group", "flight_of"]
+
+
+@functools.cache
+def flight_of(scheme: str) -> ModuleType:
+    """The flight of autopilots under a scheme, see `flight`: compiled, or plain Python if numba refuses the scheme."""
+    stages = tick_of(scheme)
+    flight = instantiate("ftcc.airside.flight", scheme, stages=stages)
+    if stages.REFUSAL:
+        uncompile([flight])
+    return flight
+
+
+class AutopilotGroup(NamedTuple):
+    """k autopilots of one scheme that fly in one process."""
+
+    autopilots: Autopilots
+    inbox: Inbox
+    events: LinkEvents
+    exchange: Exchange
+    transmission: Transmission
+    """What goes to other processes after an exchange; empty if nobody there hears these UAVs."""
+    wire: Wire
+    rows: Rows
+    """Of the recording; leaders fill none."""
+    link_rows: Rows
+    """Of the recording of the links."""
+    alive: NDArray[np.int64]
+    """(k,): 0 once a UAV has ended."""
+    active: NDArray[np.int64]
+    """(k,): 1 for those that take part in this tick."""
+    heard_outside: NDArray[np.int64]
+    """(k,): 1 for those that UAVs of other processes hear."""
+    travels_by: NDArray[np.int64]
+    """(k,): how commands travel to the vehicles, see `wire`."""
+    pending: NDArray[np.int64]
+    """(k,): tick of the state that has come and was not worked on yet; -1: there is none."""
+    arrived: NDArray[np.float64]
+    """(k, 13): that state, see ``wire.STATE``."""
+    arrived_controls: NDArray[np.float64]
+    """(k, 4): the command in force that came with it, fractions of travel."""
+    told: NDArray[np.int64]
+    """(k,): whether one came; otherwise it is the command that answers the last state."""
+    states: NDArray[np.float64]
+    """(k, 13): the states of this tick."""
+    reported: NDArray[np.float64]
+    """(k, 4): the commands in force at this tick, as fractions of travel, then in rad and N."""
+    controls: NDArray[np.float64]
+    """(k, 4): the commands that answer them, fractions of travel."""
+    target: NDArray[np.float64]
+    """(5,): room for an attitude target."""
+    done: NDArray[np.int64]
+    """(k,): the last tick of each."""
+    given_up: NDArray[np.int64]
+    """(1,): UAVs whose law gave no finite command and of which nobody was told yet."""
+    unsendable: NDArray[np.int64]
+    """(1,): 1 where something that was to be sent is not finite."""
+    complete: NDArray[np.int64]
+    """(1,): lockstep: all transmissions of other processes up to this number are here."""
+    acknowledged: NDArray[np.int64]
+    """(1,): lockstep: those who hear this process have its transmissions up to this number."""
+    mail: NDArray[np.int64]
+    """(1,): 1 where the mesh has brought something."""
+    report_us: NDArray[np.int64]
+    """(1,): simulated time from which on something is to be told to the ground."""
+    attention: NDArray[np.float64]
+    """(1,): wall time from which on Python wants to look around, s (monotonic)."""
+    since: NDArray[np.float64]
+    """(1,): wall time since which states are awaited, s."""
+    room: NDArray[np.int64]
+    """(2,): for the clock, see `system_calls`."""
+
+
+def _travels_by(spec: AutopilotSpec) -> int:
+    if spec.role == "leader":
+        return BY_POSITION
+    return BY_ATTITUDE if spec.attitude_code.loading > 0.0 else BY_ACTUATORS
+
+
+def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link_rows: Rows) -> AutopilotGroup:
+    """Arrays for ``specs``, which share one scheme, before the first tick."""
+    k = len(specs)
+    autopilots, inbox = build(specs, timing)
+    own = [spec.uav for spec in specs]
+    senders = [[neighbour.uav for neighbour in spec.neighbours] for spec in specs]
+    values = autopilots.shared.shape[1]
+    return AutopilotGroup(
+        autopilots=autopilots,
+        inbox=inbox,
+        events=link_events(specs),
+        exchange=new_exchange(own, senders, inbox.valid.shape[1], values),
+        transmission=new_transmission(k, values),
+        wire=new_wire(own, AUTOPILOT),
+        rows=rows,
+        link_rows=link_rows,
+        alive=np.ones(k, np.int64),
+        active=np.zeros(k, np.int64),
+        heard_outside=np.array([bool(set(spec.hearers) - set(own)) for spec in specs], np.int64),
+        travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
+        pending=np.full(k, -1, np.int64),
+        arrived=np.zeros((k, len(STATE))),
+        arrived_controls=np.zeros((k, 4)),
+        told=np.zeros(k, np.int64),
+        states=np.zeros((k, len(STATE))),
+        reported=np.zeros((k, 4)),
+        controls=np.zeros((k, 4)),
+        target=np.zeros(len(TARGET)),
+        done=np.full(k, -1, np.int64),
+        given_up=np.zeros(1, np.int64),
+        unsendable=np.zeros(1, np.int64),
+        complete=np.full(1, -1, np.int64),
+        acknowledged=np.full(1, -1, np.int64),
+        mail=np.zeros(1, np.int64),
+        report_us=np.zeros(1, np.int64),
+        attention=np.zeros(1),
+        since=np.zeros(1),
+        room=np.zeros(2, np.int64),
+    )

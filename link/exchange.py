@@ -1,0 +1,248 @@
+"""The exchange of records between UAVs: what was said last, who is due to hear it, and how it travels on the mesh.
+
+Every UAV tells its neighbours a record, a few shared numbers with a stamp, once in an exchange period. A process keeps
+the last records of the UAVs that its own ones hear; a record waits there until its latency has passed, then it goes
+through the emulated channel of each edge (`channel`). What a process's UAVs tell at one instant is one transmission on
+the mesh. The functions are compiled: the autopilot process and the single-process simulation run the very same code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.channel import Edge, admit
+from ftcc.link.compiled import compiled, copy
+
+__all__ = [
+    "VERSION",
+    "Exchange",
+    "Header",
+    "Transmission",
+    "TransmissionError",
+    "append",
+    "begin",
+    "deliver",
+    "new_exchange",
+    "new_transmission",
+    "newest_slot",
+    "octets_of",
+    "post",
+    "problem_text",
+    "take_in",
+]
+
+VERSION = 2
+"""Of transmissions."""
+
+_HISTORY = 64
+"""Records kept of each sender."""
+
+_NEXT = Edge._fields.index("next_sequence")
+
+
+class TransmissionError(ValueError):
+    """What came by the mesh, or was to be put on it, is no transmission of this version."""
+
+
+class Exchange(NamedTuple):
+    """The last records of the s UAVs that the k UAVs of a process hear, or that are its own."""
+
+    sender: NDArray[np.int64]
+    """(k, n): the row below of the UAV behind each in-edge."""
+    row_of: NDArray[np.int64]
+    """(256,): the row of each UAV by its id; -1 where it is not heard here."""
+    count: NDArray[np.int64]
+    """(s,): sequence number that the next record of a sender would have."""
+    sequence: NDArray[np.int64]
+    """(s, HISTORY): sequence number of each record kept; -1: none."""
+    stamp: NDArray[np.int64]
+    """(s, HISTORY): simulated time for which its values hold, us."""
+    radio_on: NDArray[np.int64]
+    """(s, HISTORY)."""
+    values: NDArray[np.float64]
+    """(s, HISTORY, m)."""
+
+
+def new_exchange(own: Sequence[int], senders: Sequence[Sequence[int]], edges: int, values: int) -> Exchange:
+    """An exchange in which nothing was said yet.
+
+    Parameters
+    ----------
+    own : ids of the process's UAVs: the first rows, in this order.
+    senders : for each of them the ids of the UAVs that it hears.
+    edges : in-edges that there is room for, see ``Inbox``.
+    values : numbers in a record.
+    """
+    everybody = [*own, *sorted({uav for row in senders for uav in row} - set(own))]
+    row_of = np.full(256, -1, np.int64)
+    row_of[everybody] = np.arange(len(everybody))
+    sender = np.zeros((len(own), edges), np.int64)
+    for i, row in enumerate(senders):
+        sender[i, : len(row)] = row_of[list(row)]
+    s = len(everybody)
+    return Exchange(
+        sender=sender,
+        row_of=row_of,
+        count=np.zeros(s, np.int64),
+        sequence=np.full((s, _HISTORY), -1, np.int64),
+        stamp=np.zeros((s, _HISTORY), np.int64),
+        radio_on=np.zeros((s, _HISTORY), np.int64),
+        values=np.zeros((s, _HISTORY, values)),
+    )
+
+
+@compiled
+def post(exchange, row, sequence, stamp_us, radio_on, values):
+    """Keep a record of the sender in ``row``; one that is not newer than the last is dropped."""
+    if sequence < exchange.count[row]:
+        return
+    slot = sequence % _HISTORY
+    exchange.sequence[row, slot] = sequence
+    exchange.stamp[row, slot] = stamp_us
+    exchange.radio_on[row, slot] = radio_on
+    for m in range(exchange.values.shape[2]):
+        exchange.values[row, slot, m] = values[m]
+    exchange.count[row] = sequence + 1
+
+
+@compiled
+def newest_slot(exchange, row):
+    """Where the last record of the sender in ``row`` stands in the arrays of records."""
+    return (exchange.count[row] - 1) % _HISTORY
+
+
+@compiled
+def deliver(exchange, inbox, radio_on, i, now_us, latency_us, seed):
+    """Pass what is due for UAV ``i`` at ``now_us`` through the channels of its in-edges into its inbox.
+
+    ``radio_on`` tells whether its own radio is on; a radio that is off neither hears nor is heard.
+    """
+    for edge in range(inbox.degree[i]):
+        row = exchange.sender[i, edge]
+        count = exchange.count[row]
+        sequence = max(inbox.edges[i, edge, _NEXT], count - _HISTORY)
+        while sequence < count:
+            slot = sequence % _HISTORY
+            if exchange.sequence[row, slot] == sequence:
+                stamp = exchange.stamp[row, slot]
+                if stamp + latency_us > now_us:
+                    break
+                both_on = exchange.radio_on[row, slot] == 1 and radio_on == 1
+                values = exchange.values[row, slot]
+                admit(inbox, i, edge, sequence, stamp, both_on, values, latency_us, now_us, seed)
+            sequence += 1
+
+
+class Header(NamedTuple):
+    """The words with which a transmission begins."""
+
+    version: int
+    number: int
+    """Lockstep: number of the exchange."""
+    heard: int
+    """Lockstep: the sender has the transmissions up to this number of all whom it waits for."""
+    last: int
+    """1: nothing will follow."""
+    count: int
+    """Records in it."""
+    values: int
+    """Numbers in each record."""
+
+
+_HEADER = len(Header._fields)
+_PREFIX = 4
+"""Words of a record before its values: UAV, sequence number, stamp, whether its radio is on."""
+_VERSION, _NUMBER, _HEARD, _LAST, _COUNT, _VALUES = range(_HEADER)
+
+
+class Transmission(NamedTuple):
+    """Room for one, as whole numbers and as floats: all are of 8 bytes."""
+
+    words: NDArray[np.int64]
+    floats: NDArray[np.float64]
+    used: NDArray[np.int64]
+    """(1,): words in use."""
+
+
+def new_transmission(records: int, values: int) -> Transmission:
+    """Room for so many records."""
+    words = np.zeros(_HEADER + records * (_PREFIX + values), np.int64)
+    return Transmission(words, words.view(np.float64), np.zeros(1, np.int64))
+
+
+def octets_of(transmission: Transmission) -> bytes:
+    """A transmission as it travels: little-endian words."""
+    return transmission.words[: transmission.used[0]].astype("<i8", copy=False).tobytes()
+
+
+@compiled
+def begin(transmission, number, heard, last, values):
+    """Begin a transmission without records, see `Header`."""
+    words = transmission.words
+    words[_VERSION], words[_NUMBER], words[_HEARD] = VERSION, number, heard
+    words[_LAST], words[_COUNT], words[_VALUES] = last, 0, values
+    transmission.used[0] = _HEADER
+
+
+@compiled
+def append(transmission, uav, sequence, stamp_us, radio_on, values):
+    """Append a record; False, and nothing is appended, where a value is not finite: nan never enters the mesh."""
+    for m in range(transmission.words[_VALUES]):
+        if not np.isfinite(values[m]):
+            return False
+    at = transmission.used[0]
+    words = transmission.words
+    words[at], words[at + 1], words[at + 2], words[at + 3] = uav, sequence, stamp_us, radio_on
+    copy(values[: words[_VALUES]], transmission.floats[at + _PREFIX :])
+    words[_COUNT] += 1
+    transmission.used[0] = at + _PREFIX + words[_VALUES]
+    return True
+
+
+_GOOD, _SHORT, _OTHER_VERSION, _WRONG_LENGTH, _NOT_FINITE = range(5)
+
+
+@compiled
+def take_in(transmission, exchange):
+    """Keep the records of a transmission that came by the mesh, as far as somebody here hears their senders.
+
+    Returns a code for `problem_text`; not 0, and nothing is kept, where it is not sound.
+    """
+    words, floats, used = transmission.words, transmission.floats, transmission.used[0]
+    if used < _HEADER:
+        return _SHORT
+    if words[_VERSION] != VERSION:
+        return _OTHER_VERSION
+    width = _PREFIX + words[_VALUES]
+    if words[_VALUES] != exchange.values.shape[2] or words[_COUNT] < 0 or used != _HEADER + words[_COUNT] * width:
+        return _WRONG_LENGTH
+    for n in range(words[_COUNT]):
+        at = _HEADER + n * width
+        for m in range(_PREFIX, width):
+            if not np.isfinite(floats[at + m]):
+                return _NOT_FINITE
+    for n in range(words[_COUNT]):
+        at = _HEADER + n * width
+        uav = words[at]
+        if 0 <= uav < exchange.row_of.shape[0] and exchange.row_of[uav] >= 0:
+            values = floats[at + _PREFIX : at + width]
+            post(exchange, exchange.row_of[uav], words[at + 1], words[at + 2], words[at + 3], values)
+    return _GOOD
+
+
+def problem_text(code: int, transmission: Transmission) -> str:
+    """What `take_in` found wrong, for people."""
+    header = transmission.words[:_HEADER].tolist()
+    return {
+        _SHORT: f"a transmission of {8 * int(transmission.used[0])} bytes is too short",
+        _OTHER_VERSION: f"transmission version {header[_VERSION]}, this program speaks {VERSION}",
+        _WRONG_LENGTH: (
+            f"a transmission of {8 * int(transmission.used[0])} bytes does not hold {header[_COUNT]} records "
+            f"of {header[_VALUES]} values"
+        ),
+        _NOT_FINITE: "a UAV shared a value that is not finite",
+    }[code]

@@ -1,0 +1,379 @@
+"""The wire between the vehicles and the autopilots of a process: their sockets, and a tick's messages as datagrams.
+
+A vehicle sends its state: ATTITUDE_QUATERNION and LOCAL_POSITION_NED, and HIL_ACTUATOR_CONTROLS where the autopilot
+does not know which command is in force. The autopilot answers with HIL_ACTUATOR_CONTROLS, with SET_ATTITUDE_TARGET, or,
+for a leader, with SET_POSITION_TARGET_LOCAL_NED. Compiled code packs and reads them, see `frames`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.codec import Codec, dialect
+from ftcc.link.compiled import compiled
+from ftcc.link.frames import (
+    ACTUATORS,
+    ATTITUDE,
+    ATTITUDE_TARGET,
+    LARGEST_FRAME,
+    POSITION,
+    POSITION_TARGET,
+    Payload,
+    clear,
+    new_payload,
+    place,
+    read_frame,
+    write_frame,
+)
+from ftcc.link.mavlink import Endpoint
+from ftcc.link.system_calls import READABLE, receive, send
+
+__all__ = [
+    "BY_ACTUATORS",
+    "BY_ATTITUDE",
+    "BY_POSITION",
+    "STATE",
+    "Wire",
+    "connect",
+    "is_readable",
+    "keep_sent",
+    "new_wire",
+    "read_attitude_target",
+    "read_command",
+    "read_position_target",
+    "read_state",
+    "receive_datagram",
+    "send_again",
+    "send_attitude_target",
+    "send_command",
+    "send_position_target",
+    "send_state",
+    "split",
+]
+
+STATE = ("q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed", "x", "y", "z", "vx", "vy", "vz")
+"""The float32 fields of ATTITUDE_QUATERNION and LOCAL_POSITION_NED, in this order."""
+
+BY_ACTUATORS, BY_ATTITUDE, BY_POSITION = range(3)
+"""How commands travel to a vehicle: as actuator commands, as attitude targets, or, a leader's, as position targets."""
+
+_LARGEST_DATAGRAM = 4096
+
+# Where the fields stand. Those that follow each other are written one after the other.
+_Q1 = place(dialect.MAVLink_attitude_quaternion_message, "q1")
+_X = place(dialect.MAVLink_local_position_ned_message, "x")
+_CONTROLS = place(dialect.MAVLink_hil_actuator_controls_message, "controls")
+_TARGET_Q = place(dialect.MAVLink_set_attitude_target_message, "q")
+_THRUST = place(dialect.MAVLink_set_attitude_target_message, "thrust")
+_ATTITUDE_SYSTEM = place(dialect.MAVLink_set_attitude_target_message, "target_system")
+_ATTITUDE_COMPONENT = place(dialect.MAVLink_set_attitude_target_message, "target_component")
+_ATTITUDE_MASK = place(dialect.MAVLink_set_attitude_target_message, "type_mask")
+_TARGET_X = place(dialect.MAVLink_set_position_target_local_ned_message, "x")
+_TARGET_VX = place(dialect.MAVLink_set_position_target_local_ned_message, "vx")
+_POSITION_SYSTEM = place(dialect.MAVLink_set_position_target_local_ned_message, "target_system")
+_POSITION_COMPONENT = place(dialect.MAVLink_set_position_target_local_ned_message, "target_component")
+_POSITION_MASK = place(dialect.MAVLink_set_position_target_local_ned_message, "type_mask")
+_FRAME = place(dialect.MAVLink_set_position_target_local_ned_message, "coordinate_frame")
+
+_LOCAL_NED = int(dialect.MAV_FRAME_LOCAL_NED)
+_NO_RATES = int(
+    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+    | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+)
+_POSITION_AND_VELOCITY = int(
+    dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+)
+_STATE_NUMBERS = (POSITION.number, ACTUATORS.number)
+"""What may follow ATTITUDE_QUATERNION in a state."""
+_NUMBERS = frozenset(shape.number for shape in (ATTITUDE, POSITION, ACTUATORS, ATTITUDE_TARGET, POSITION_TARGET))
+_SIMULATOR = 25
+"""Component that targets are for, see ``mavlink.SIMULATOR``."""
+
+
+class Wire(NamedTuple):
+    """One end of the wire, for the k UAVs of a process."""
+
+    socket: NDArray[np.int64]
+    """(k,): descriptors."""
+    system: NDArray[np.int64]
+    """(k,): MAVLink system that sends."""
+    component: NDArray[np.int64]
+    """(k,): and component."""
+    sequence: NDArray[np.int64]
+    """(k,): sequence number of the next message."""
+    sent: NDArray[np.uint8]
+    """(k, n): the last datagram, to be sent again where its answer does not come."""
+    sent_length: NDArray[np.int64]
+    """(k,): its bytes; 0 before the first."""
+    payload: Payload
+    """Of the message at hand."""
+    datagram: NDArray[np.uint8]
+    """(n,): the one that was received last."""
+    length: NDArray[np.int64]
+    """(1,): its bytes."""
+    whose: NDArray[np.int64]
+    """(1,): index of the UAV for which it is."""
+    polled: NDArray[np.int32]
+    """(k + 2, 2): what is waited for, see `system_calls.wait`: the sockets, then what else wakes the process up."""
+
+
+def new_wire(systems: Sequence[int], component: int) -> Wire:
+    """One end of the wire for UAVs that send as these MAVLink systems; its sockets are those of `connect`."""
+    k = len(systems)
+    polled = np.zeros((k + 2, 2), np.int32)
+    polled[:, 0] = -1
+    polled[:, 1] = READABLE
+    return Wire(
+        socket=np.full(k, -1, np.int64),
+        system=np.array(systems, np.int64),
+        component=np.full(k, component, np.int64),
+        sequence=np.zeros(k, np.int64),
+        sent=np.zeros((k, 4 * LARGEST_FRAME), np.uint8),
+        sent_length=np.zeros(k, np.int64),
+        payload=new_payload(),
+        datagram=np.zeros(_LARGEST_DATAGRAM, np.uint8),
+        length=np.zeros(1, np.int64),
+        whose=np.zeros(1, np.int64),
+        polled=polled,
+    )
+
+
+def connect(wire: Wire, endpoints: Sequence[Endpoint], others: int, mesh: int = -1) -> None:
+    """Give the wire its sockets.
+
+    Parameters
+    ----------
+    endpoints : in the order of the UAVs. What they send by themselves is counted with what is sent here.
+    others : descriptor of everything else that wakes the process up.
+    mesh : descriptor of the mesh; -1: none.
+    """
+    wire.polled[:, 0] = [*(endpoint.fileno() for endpoint in endpoints), others, mesh]
+    for i, endpoint in enumerate(endpoints):
+        wire.socket[i] = endpoint.fileno()
+        endpoint.sequence = wire.sequence[i : i + 1]
+
+
+def keep_sent(wire: Wire, i: int, datagram: bytes) -> None:
+    """Make ``datagram`` the one that `send_again` sends for UAV ``i``."""
+    wire.sent[i, : len(datagram)] = np.frombuffer(datagram, np.uint8)
+    wire.sent_length[i] = len(datagram)
+
+
+def split(wire: Wire, codec: Codec) -> Iterator[Any]:
+    """The datagram at hand as pymavlink reads it: its messages one after the other.
+
+    None stands for messages of a tick, which then are at hand as if they had come alone.
+    """
+    messages = codec.parse(wire.datagram[: wire.length[0]].tobytes())
+    while messages:
+        run = [messages.pop(0)]
+        if run[0].get_msgId() not in _NUMBERS:
+            yield run[0]
+            continue
+        for expected in _STATE_NUMBERS:
+            if run[0].get_msgId() == ATTITUDE.number and messages and messages[0].get_msgId() == expected:
+                run.append(messages.pop(0))
+        datagram = Codec(0, 0).pack(*run)
+        wire.datagram[: len(datagram)] = np.frombuffer(datagram, np.uint8)
+        wire.length[0] = len(datagram)
+        yield None
+
+
+@compiled
+def is_readable(wire, n):
+    """Whether row ``n`` of ``polled`` can be read, or has an error that reading takes away."""
+    return wire.polled[n, 1] >> 16 != 0
+
+
+@compiled
+def receive_datagram(wire, i):
+    """The next datagram for UAV ``i``; False if none has come."""
+    wire.whose[0] = i
+    wire.length[0] = receive(wire.socket[i], wire.datagram)
+    return wire.length[0] >= 0
+
+
+@compiled
+def send_again(wire, i):
+    """Send the last datagram of UAV ``i`` once more."""
+    if wire.sent_length[i] > 0:
+        send(wire.socket[i], wire.sent[i], wire.sent_length[i])
+
+
+@compiled
+def _append(wire, i, shape, at):
+    """Append the message at hand to UAV ``i``'s datagram; where it ends, -1 if it cannot be sent."""
+    end = write_frame(wire.payload, shape, wire.system[i], wire.component[i], wire.sequence[i], wire.sent[i], at)
+    wire.sequence[i] = wire.sequence[i] + 1 & 0xFF
+    return end
+
+
+@compiled
+def _send(wire, i, end):
+    """Send UAV ``i``'s datagram of ``end`` bytes; False where it holds what must not be sent."""
+    if end < 0:
+        wire.sent_length[i] = 0
+        return False
+    wire.sent_length[i] = end
+    send(wire.socket[i], wire.sent[i], end)
+    return True
+
+
+@compiled
+def _put_command(wire, stamp_us, controls):
+    clear(wire.payload)
+    wire.payload.longs[0] = stamp_us
+    for n in range(4):
+        wire.payload.floats[_CONTROLS + n] = controls[n]
+
+
+@compiled
+def send_state(wire, i, stamp_us, state, controls, with_controls):
+    """Send the state (13,), see `STATE`, and, where asked for, the command in force (4,), as fractions of travel.
+
+    False, and nothing is sent, where a value is not finite, or not within float32; so do the other functions.
+    """
+    payload = wire.payload
+    clear(payload)
+    payload.words[0] = stamp_us // 1000
+    for n in range(7):
+        payload.floats[_Q1 + n] = state[n]
+    end = _append(wire, i, ATTITUDE, 0)
+    if end < 0:
+        return _send(wire, i, end)
+    clear(payload)
+    payload.words[0] = stamp_us // 1000
+    for n in range(6):
+        payload.floats[_X + n] = state[7 + n]
+    end = _append(wire, i, POSITION, end)
+    if with_controls and end > 0:
+        _put_command(wire, stamp_us, controls)
+        end = _append(wire, i, ACTUATORS, end)
+    return _send(wire, i, end)
+
+
+@compiled
+def send_command(wire, i, stamp_us, controls):
+    """Send an actuator command (4,), as fractions of travel, that answers the state of that stamp."""
+    _put_command(wire, stamp_us, controls)
+    return _send(wire, i, _append(wire, i, ACTUATORS, 0))
+
+
+@compiled
+def send_attitude_target(wire, i, stamp_us, target):
+    """Send an attitude target (5,), see ``attitude_target.TARGET``, that answers the state of that stamp."""
+    payload = wire.payload
+    clear(payload)
+    payload.words[0] = stamp_us // 1000
+    for n in range(4):
+        payload.floats[_TARGET_Q + n] = target[n]
+    payload.floats[_THRUST] = target[4]
+    payload.octets[_ATTITUDE_SYSTEM] = wire.system[i]
+    payload.octets[_ATTITUDE_COMPONENT] = _SIMULATOR
+    payload.octets[_ATTITUDE_MASK] = _NO_RATES
+    return _send(wire, i, _append(wire, i, ATTITUDE_TARGET, 0))
+
+
+@compiled
+def send_position_target(wire, i, target):
+    """Send a leader's target (stamp s, x, y, z, vx, vy, vz; z up) to its reference point; z is down on the wire."""
+    payload = wire.payload
+    clear(payload)
+    payload.words[0] = round(target[0] * 1e3)
+    payload.floats[_TARGET_X] = target[1]
+    payload.floats[_TARGET_X + 1] = target[2]
+    payload.floats[_TARGET_X + 2] = -target[3]
+    payload.floats[_TARGET_VX] = target[4]
+    payload.floats[_TARGET_VX + 1] = target[5]
+    payload.floats[_TARGET_VX + 2] = -target[6]
+    payload.octets[_POSITION_SYSTEM] = wire.system[i]
+    payload.octets[_POSITION_COMPONENT] = _SIMULATOR
+    payload.octets[_FRAME] = _LOCAL_NED
+    payload.shorts[_POSITION_MASK] = _POSITION_AND_VELOCITY
+    return _send(wire, i, _append(wire, i, POSITION_TARGET, 0))
+
+
+@compiled
+def read_state(wire, state, controls):
+    """The state in the datagram at hand.
+
+    Returns
+    -------
+    stamp, told : int
+        Its stamp in us, and whether the command in force came with it; (-1, 0) if the datagram is anything but one
+        state.
+    """
+    payload, end = wire.payload, wire.length[0]
+    number, at = read_frame(wire.datagram, 0, end, payload)
+    if number != ATTITUDE.number:
+        return -1, 0
+    milliseconds = np.int64(payload.words[0])
+    for n in range(7):
+        state[n] = payload.floats[_Q1 + n]
+    number, at = read_frame(wire.datagram, at, end, payload)
+    if number != POSITION.number or payload.words[0] != milliseconds:
+        return -1, 0
+    for n in range(6):
+        state[7 + n] = payload.floats[_X + n]
+    stamp = milliseconds * 1000
+    if at == end:
+        return stamp, 0
+    number, at = read_frame(wire.datagram, at, end, payload)
+    if number != ACTUATORS.number or payload.longs[0] != stamp or at != end:
+        return -1, 0
+    for n in range(4):
+        controls[n] = payload.floats[_CONTROLS + n]
+    return stamp, 1
+
+
+@compiled
+def _read_alone(wire, shape):
+    """Whether the datagram at hand is one message with the layout ``shape``, which then is in ``payload``."""
+    number, at = read_frame(wire.datagram, 0, wire.length[0], wire.payload)
+    return number == shape.number and at == wire.length[0]
+
+
+@compiled
+def read_command(wire, controls):
+    """The actuator command in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    if not _read_alone(wire, ACTUATORS):
+        return -1
+    for n in range(4):
+        controls[n] = wire.payload.floats[_CONTROLS + n]
+    return wire.payload.longs[0]
+
+
+@compiled
+def read_attitude_target(wire, target):
+    """The attitude target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    if not _read_alone(wire, ATTITUDE_TARGET):
+        return -1
+    for n in range(4):
+        target[n] = wire.payload.floats[_TARGET_Q + n]
+    target[4] = wire.payload.floats[_THRUST]
+    return np.int64(wire.payload.words[0]) * 1000
+
+
+@compiled
+def read_position_target(wire, target):
+    """The leader's target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    if not _read_alone(wire, POSITION_TARGET):
+        return -1
+    payload = wire.payload
+    target[0] = np.int64(payload.words[0]) / 1e3
+    target[1] = payload.floats[_TARGET_X]
+    target[2] = payload.floats[_TARGET_X + 1]
+    target[3] = -payload.floats[_TARGET_X + 2]
+    target[4] = payload.floats[_TARGET_VX]
+    target[5] = payload.floats[_TARGET_VX + 1]
+    target[6] = -payload.floats[_TARGET_VX + 2]
+    return np.int64(payload.words[0]) * 1000

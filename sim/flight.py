@@ -1,0 +1,309 @@
+"""The flight of a vehicle process, compiled: from the commands that answer the last states to the next states.
+
+A template, see `link.compiled`: the free name ``cycle`` is the module of the flight of one vehicle on a plant.
+`plants.flight_of` gives this module with it filled in. `tick` lists what a tick does; the rest waits for it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ftcc.link.actuators import decode_command
+from ftcc.link.attitude_target import decode_target, path_of
+from ftcc.link.compiled import compiled, compiled_to_wait, copy
+from ftcc.link.process import RESEND
+from ftcc.link.recording import is_full
+from ftcc.link.system_calls import monotonic, pause, wait
+from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, HELD, WORK
+from ftcc.link.wire import (
+    BY_ACTUATORS,
+    BY_ATTITUDE,
+    BY_POSITION,
+    is_readable,
+    read_attitude_target,
+    read_command,
+    read_position_target,
+    receive_datagram,
+    send_again,
+    send_state,
+)
+from ftcc.sim.obstacles import clearance
+from ftcc.sim.plant import X, Z, latch
+
+__all__ = ["fly", "take", "tick"]
+
+if "cycle" not in globals():
+    raise ImportError("ftcc.sim.flight is a template: use ftcc.sim.plants.flight_of(plant)")
+
+cycle: Any = globals()["cycle"]
+
+_sense = cycle.sense
+_advance = cycle.advance
+_conditions = cycle.conditions
+
+_DATAGRAMS = 64
+"""Read of one autopilot at a time, at most: a flood must not hold up a tick for ever."""
+_LOOK = 20
+"""Longest wait before the clock is looked at, ms."""
+_BEHIND = 0.1
+"""What a swarm in lockstep may be behind its pace and catch up, wall s: beyond it, simulated time is slower."""
+
+
+@compiled
+def _now(group, timing):
+    return group.tick[0] * timing.period_us
+
+
+@compiled
+def _answers_last(group, timing, i):
+    """Whether the newest command of vehicle ``i`` answers its last state."""
+    return group.tick[0] > 0 and group.answered[i] == _now(group, timing) - timing.period_us
+
+
+@compiled
+def tick(group, timing):
+    """One tick of the vehicles: the newest commands come into force, states go out, and all fly on to the next."""
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            bring_into_force(group, timing, i)
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            state, controls = group.states[i], group.controls[i]
+            now_us = _now(group, timing)
+            _sense(group.fleet, i, group.tick[0], now_us, timing.seed, group.true[i], group.seen, state, controls)
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            tell(group, timing, i)
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            record(group, timing, i)
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            fly_on(group, timing, i)
+
+
+@compiled
+def bring_into_force(group, timing, i):
+    """The newest command of vehicle ``i``; one that does not answer its last state is late."""
+    if group.tick[0] == 0:
+        return
+    fleet = group.fleet
+    if not _answers_last(group, timing, i):
+        group.late[i] += 1
+    if group.answered[i] < 0:
+        return
+    if group.travels_by[i] == BY_POSITION:
+        copy(group.targets[i], fleet.target[i])
+        return
+    if group.travels_by[i] == BY_ATTITUDE:
+        copy(group.received[i], group.latched)
+    else:
+        decode_command(group.received[i], fleet.travel[i], group.latched)
+    latch(fleet, i, group.latched)
+
+
+@compiled
+def tell(group, timing, i):
+    """Send the state; with the command in force, unless it is the one that answers the last state."""
+    now_us, state = _now(group, timing), group.states[i]
+    if group.travels_by[i] == BY_ATTITUDE:
+        n = group.tick[0] % group.paths.shape[1]
+        group.path_stamps[i, n] = now_us
+        group.paths[i, n, 0], group.paths[i, n, 1], group.paths[i, n, 2] = path_of(state[10], state[11], state[12])
+    known = _answers_last(group, timing, i) and group.delays[i] == 0
+    send_state(group.wire, i, now_us, state, group.controls[i], not known)
+
+
+@compiled
+def _know(group, i, now_us, out):
+    """Write what only the simulator knows of vehicle ``i`` into ``out``, in the order of ``process.truth_array``."""
+    commands = group.true.shape[1]
+    acting = commands + group.controls.shape[1]
+    copy(group.true[i], out)
+    copy(group.fleet.command[i], out[commands:])
+    copy(group.fleet.acting[i], out[acting:])
+    _conditions(group.fleet, i, now_us / 1e6, out[acting + group.controls.shape[1] :])
+
+
+@compiled
+def record(group, timing, i):
+    """A row of the recording, where one is due."""
+    if group.tick[0] % timing.record_every != 0:
+        return
+    now_us = _now(group, timing)
+    row = group.rows.values[i, group.rows.filled[i]]
+    row[0], row[1] = now_us / 1e6, float(group.fleet.uav[i])
+    _know(group, i, now_us, row[2:])
+    if group.fleet.zones.shape[0] > 0:
+        row[row.shape[0] - 1] = clearance(group.fleet.zones, group.true[i, X], group.true[i, Z])
+    group.rows.filled[i] += 1
+
+
+@compiled
+def fly_on(group, timing, i):
+    """Fly vehicle ``i`` for one period; one that leaves its model is lost."""
+    why = _advance(group.fleet, i, _now(group, timing), timing.period_us, timing.step_us)
+    if why > 0:
+        group.why[i] = why
+        group.alive[i] = 0
+        group.lost[0] += 1
+
+
+@compiled
+def know(group, timing):
+    """Set ``known`` of the living after this tick, for the station."""
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1:
+            _know(group, i, _now(group, timing), group.known[i])
+
+
+# The flight of a vehicle process: ticks, and waiting for them.
+
+
+@compiled
+def _read_command(group, i):
+    """The stamp of the command in the datagram at hand for vehicle ``i``; -1 if there is none, -2 if it is too old."""
+    wire = group.wire
+    if group.travels_by[i] == BY_POSITION:
+        return read_position_target(wire, group.targets[i])
+    if group.travels_by[i] == BY_ACTUATORS:
+        return read_command(wire, group.received[i])
+    stamp = read_attitude_target(wire, group.attitude)
+    if stamp < 0:
+        return -1
+    for n in range(group.paths.shape[1]):
+        if group.path_stamps[i, n] == stamp:
+            V, gamma, chi = group.paths[i, n, 0], group.paths[i, n, 1], group.paths[i, n, 2]
+            travel, code = group.fleet.travel[i], group.fleet.code[i]
+            decode_target(group.attitude, V, gamma, chi, travel, code, group.received[i])
+            return stamp
+    return -2
+
+
+@compiled
+def take(group, i):
+    """Take in the datagram at hand for vehicle ``i``: its command counts, if it is one; else its cause."""
+    stamp = _read_command(group, i)
+    if stamp == -1:
+        return DATAGRAM
+    if group.alive[i] == 0:
+        # Whose aircraft is lost says so again, as often as it is asked.
+        send_again(group.wire, i)
+    else:
+        group.answered[i] = max(group.answered[i], stamp)
+    return GO_ON
+
+
+@compiled
+def listen(group, timing, until):
+    """Read what the autopilots sent: until all have answered ``until`` (us), or, if it is -1, all that has come."""
+    for i in range(group.alive.shape[0]):
+        for _ in range(_DATAGRAMS):
+            if until >= 0 and (group.alive[i] == 0 or group.answered[i] >= until):
+                break
+            if not receive_datagram(group.wire, i):
+                break
+            cause = take(group, i)
+            if cause != GO_ON:
+                return cause
+    return GO_ON
+
+
+@compiled
+def _all_answered(group, stamp):
+    missing = 0
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.answered[i] < stamp:
+            missing += 1
+    return missing == 0
+
+
+@compiled
+def _look_around(group, milliseconds, first):
+    """Wait for the descriptors from row ``first`` of ``polled`` on; the cause if it is time for Python to look."""
+    polled = group.wire.polled
+    wait(polled[first:], milliseconds)
+    others = group.alive.shape[0]
+    if is_readable(group.wire, others) or monotonic(group.room) >= group.attention[0]:
+        return ATTEND
+    return GO_ON
+
+
+@compiled
+def await_answers(group, timing):
+    """Lockstep: wait until every living vehicle's last state has been answered."""
+    wanted = _now(group, timing) - timing.period_us
+    while wanted >= 0:
+        cause = listen(group, timing, wanted)
+        if cause != GO_ON:
+            return cause
+        if _all_answered(group, wanted):
+            break
+        now = monotonic(group.room)
+        if now - group.since[0] > RESEND:
+            group.since[0] = now
+            for i in range(group.alive.shape[0]):
+                if group.alive[i] == 1 and group.answered[i] < wanted:
+                    send_again(group.wire, i)
+        cause = _look_around(group, _LOOK, 0)
+        if cause != GO_ON:
+            return cause
+    return GO_ON
+
+
+@compiled
+def await_pace(group, timing, lockstep):
+    """Wait until the tick is due. In lockstep, a swarm that has fallen behind goes on from where it is."""
+    pace = group.pace
+    due = pace[0] + (group.tick[0] - pace[1]) * (timing.period_us / 1e6) / pace[2]
+    others = group.alive.shape[0]
+    while True:
+        rest = due - monotonic(group.room)
+        if lockstep and rest < -_BEHIND:
+            pace[0] += -rest - _BEHIND
+        if rest <= 0.0:
+            return GO_ON
+        if rest < 1e-3:
+            pause(rest, group.room)
+        else:
+            cause = _look_around(group, min(int(rest * 1e3), _LOOK), others)
+            if cause != GO_ON:
+                return cause
+
+
+@compiled
+def something_to_do(group, timing):
+    """Whether Python has something to do after this tick: rows to write, losses and events to tell, truth to send."""
+    if group.fleet.happenings.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
+        return True
+    return group.tick[0] == timing.ticks or is_full(group.rows)
+
+
+@compiled_to_wait
+def fly(group, timing, lockstep):
+    """Fly tick after tick until Python has something to do; why, see `link.waiting`.
+
+    In lockstep a tick waits for the answers to the last states, otherwise for the clock alone. The pace holds both.
+    """
+    while True:
+        if group.tick[0] > group.limit[0] and group.tick[0] <= timing.ticks:
+            return HELD
+        if monotonic(group.room) >= group.attention[0]:
+            return ATTEND
+        cause = GO_ON
+        if group.tick[0] <= timing.ticks:
+            cause = await_pace(group, timing, lockstep)
+        if cause == GO_ON:
+            cause = await_answers(group, timing) if lockstep else listen(group, timing, -1)
+        if cause != GO_ON:
+            return cause
+        if group.tick[0] > timing.ticks or not group.alive.any():
+            return FLOWN
+        tick(group, timing)
+        group.since[0] = monotonic(group.room)
+        work = something_to_do(group, timing)
+        if work:
+            know(group, timing)
+        group.tick[0] += 1
+        if work:
+            return WORK
