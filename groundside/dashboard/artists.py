@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.blueprints import blueprint
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import PaceCurve
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
@@ -20,10 +21,12 @@ class Artists:
 
     def __init__(self, subject: Subject, first: Snapshot) -> None:
         self._pace = PaceCurve() if first.pace is not None else None
-        self._scene = Scene(subject, first)
-        self._attitudes = Attitudes(subject) if subject.family == "attitude" else None
-        self._plots = Plots(subject)
-        self._table = Table(subject)
+        self._detail = Detail(subject)
+        self._detail.follow(first)
+        self._scene = Scene(subject, first, self._detail)
+        self._attitudes = Attitudes(subject, self._detail) if subject.family == "attitude" else None
+        self._plots = Plots(subject, self._detail)
+        self._table = Table(subject, self._detail)
 
     def static(self) -> list[Entry]:
         """What is logged once, the blueprint first."""
@@ -33,9 +36,10 @@ class Artists:
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """One instant, and what happened before it."""
-        entries = [*self._scene.draw(snapshot), *self._plots.draw(snapshot), *self._table.draw(snapshot)]
+        new = self._detail.follow(snapshot)
+        entries = [*self._scene.draw(snapshot, new), *self._plots.draw(snapshot, new), *self._table.draw(snapshot)]
         if self._attitudes is not None:
-            entries += self._attitudes.draw(snapshot)
+            entries += self._attitudes.draw(snapshot, new)
         return entries + self._draw_pace(snapshot) + events(snapshot.events)
 
     def _draw_pace(self, snapshot: Snapshot) -> list[Entry]:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline
+from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import label
 from ftcc.groundside.palette import colors
 from ftcc.groundside.snapshot import Snapshot
+from ftcc.link.rotation import body_axes
 
 __all__ = ["Attitudes"]
 
@@ -34,7 +37,8 @@ class Attitudes:
 
     title = "Attitudes, each along its own course (outlines: references; places are slots)"
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: Subject, detail: Detail) -> None:
+        self._detail = detail
         self._uavs = sorted(subject.graph.uavs)
         self._colors = colors(self._uavs)
         self._leaders = set(subject.leaders)
@@ -48,6 +52,8 @@ class Attitudes:
         self._turns = {uav: _turn(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()}
         self._poses = Poses()
         self._labels: dict[int, str] = {}
+        self._others: list[int] = []
+        """Who was drawn as a stick last."""
 
     def view(self) -> rrb.Spatial3DView:
         """The slots from behind, and a little above."""
@@ -62,9 +68,13 @@ class Attitudes:
 
     def static(self) -> list[Entry]:
         """Shapes, colours, slots."""
-        entries = [Entry("/attitudes", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
+        return [Entry("/attitudes", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP), *self._shapes(self._detail.shown)]
+
+    def _shapes(self, uavs: Iterable[int]) -> list[Entry]:
+        """What is drawn of UAVs in full."""
+        entries = []
         vertices, normals = airframe(1.0)
-        for uav in self._uavs:
+        for uav in uavs:
             tint = self._colors[uav]
             shape = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=tint)
             ghost = rr.LineStrips3D(outline(1.0), colors=tint, radii=rr.Radius.ui_points(0.8))
@@ -77,10 +87,10 @@ class Attitudes:
             ]
         return entries
 
-    def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """Everything that moves."""
-        entries = []
-        for uav in self._uavs:
+    def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
+        """Everything that moves; ``new`` are those that have just come into view."""
+        entries = self._shapes(new) + self._sticks(snapshot)
+        for uav in self._detail.shown:
             text = label(uav, uav in self._leaders, snapshot)
             if text != self._labels.get(uav):
                 self._labels[uav] = text
@@ -98,6 +108,23 @@ class Attitudes:
                 pose = self._poses.of(slot, {**ahead, **wanted}, turn)
                 entries.append(Entry(f"/attitudes/reference/{uav}", snapshot.t, pose))
         return entries
+
+    def _sticks(self, snapshot: Snapshot) -> list[Entry]:
+        """All who are not drawn in full, in one call."""
+        if not self._detail.crowded:
+            return []
+        full = set(self._detail.shown)
+        others = [uav for uav in self._uavs if uav not in full and uav in snapshot.uavs]
+        places = np.array([self._slots[uav] for uav in others]).reshape(-1, 3)
+        turns = np.array([body_axes(*self._turns[uav]) for uav in others]).reshape(-1, 3, 3).transpose(0, 2, 1)
+        strips = sticks(places, [{**snapshot.uavs[uav].truth, "chi": 0.0} for uav in others], 1.0, turns)
+        drawn = rr.LineStrips3D.from_fields(strips=strips)
+        if others != self._others:
+            self._others = others
+            drawn = rr.LineStrips3D.from_fields(
+                strips=strips, colors=stick_colors(self._colors, others), radii=rr.Radius.ui_points(1.0)
+            )
+        return [Entry("/attitudes/others", snapshot.t, drawn)]
 
 
 def _turn(before: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[float, float, float, float]:

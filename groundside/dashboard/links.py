@@ -10,16 +10,22 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.shapes import arrows
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import silent_since
-from ftcc.groundside.palette import CUT, FRESH, STALE, Color, colors
+from ftcc.groundside.palette import CUT, FRESH, STALE, colors
 from ftcc.groundside.snapshot import LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
 
 __all__ = ["Links"]
 
+_FRESH, _STALE, _CUT = range(3)
+_TINTS = np.array([FRESH, STALE, CUT], np.uint8)
+"""What comes through an edge, the better the lower, and its colour."""
+_NOTES = 8
+"""Notes in the plan of a big swarm."""
 _ASIDE = 0.2
 """Distance of a note from its arrow; the circle of followers has radius 1."""
 _LOSSY = 0.01
@@ -31,8 +37,10 @@ _FORGET = 20.0
 class Links:
     """Draws the edges among the aircraft and in a plan of their own."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
+        self._detail = detail
+        self._named: list[int] = []
         graph = subject.graph
         self._uavs = sorted(graph.uavs)
         self._edges = sorted((sender, receiver) for receiver, sender in graph.weights)
@@ -44,8 +52,12 @@ class Links:
         x, y = self._plan_vectors.T / np.linalg.norm(self._plan_vectors, axis=1)
         self._plan_notes = self._plan_origins + 0.62 * self._plan_vectors + _ASIDE * np.column_stack((y, -x))
         """Nearer to who hears, and beside the arrow: those of the two directions stand apart."""
-        self._tints: list[Color] = []
-        self._notes: list[str] = []
+        self._states = np.full(len(self._edges), -1)
+        """What comes through each edge, as an index of `_TINTS`; as drawn last."""
+        self._drawn: NDArray[np.intp] = np.zeros(0, np.intp)
+        """Edges that are drawn among the aircraft."""
+        self._notes: dict[int, str] | None = None
+        """What is written at edges; None: nothing has been drawn yet."""
         self._counted = np.zeros((len(self._edges), 2))
         self._recent = np.zeros((len(self._edges), 2))
         """Records received and lost of late, of each edge."""
@@ -61,14 +73,14 @@ class Links:
     def static(self) -> list[Entry]:
         """The plan: who stands where."""
         tints = colors(self._uavs)
-        leaders = self._subject.leaders
+        crowded = self._detail.crowded
+        names = {} if crowded else {"labels": [self._name(uav) for uav in self._uavs], "show_labels": True}
         nodes = rr.Points2D(
             [self._plan[uav] for uav in self._uavs],
             colors=[tints[uav] for uav in self._uavs],
-            radii=rr.Radius.ui_points(7.0),
-            labels=[f"UAV {uav}" + (" leader" if uav in leaders else "") for uav in self._uavs],
-            show_labels=True,
+            radii=rr.Radius.ui_points(3.0 if crowded else 7.0),
             draw_order=20.0,
+            **names,
         )
         entries = [Entry("/graph/uavs", None, nodes)]
         if self._edges:
@@ -81,45 +93,95 @@ class Links:
         if not self._edges:
             return []
         t = snapshot.t
-        origins, vectors = arrows(positions[self._ends[:, 0]], positions[self._ends[:, 1]], gap, 0.12 * gap)
-        entries = [Entry("/world/links", t, rr.Arrows3D.from_fields(origins=origins, vectors=vectors))]
         links = [_link(snapshot.uavs, sender, receiver) for sender, receiver in self._edges]
-        tints = [self._color(link) for link in links]
-        if tints != self._tints:
-            self._tints = tints
-            widths = rr.Radius.ui_points([1.0 if tint == FRESH else 2.0 for tint in tints])
+        states = np.array([self._state(link) for link in links])
+        drawn = self._in_sight(states)
+        start, end = self._ends[drawn].T
+        origins, vectors = arrows(positions[start], positions[end], gap, 0.12 * gap)
+        entries = [Entry("/world/links", t, rr.Arrows3D.from_fields(origins=origins, vectors=vectors))]
+        changed = not np.array_equal(states, self._states)
+        if changed or not np.array_equal(drawn, self._drawn):
+            tints, widths = self._look(states[drawn])
             entries.append(Entry("/world/links", t, rr.Arrows3D.from_fields(colors=tints, radii=widths)))
+        if changed:
+            tints, widths = self._look(states)
             entries.append(Entry("/graph/links", t, rr.Arrows2D.from_fields(colors=tints, radii=widths)))
-        loss = self._loss(links)
-        notes = [
-            "" if _silent(receiver, snapshot) else _note(link, tint, share)
-            for (_, receiver), link, tint, share in zip(self._edges, links, tints, loss, strict=True)
-        ]
-        if notes != self._notes:
-            self._notes = notes
-            which = [i for i, text in enumerate(notes) if text]
-            texts = rr.Points2D(
-                self._plan_notes[which],
-                labels=[notes[i] for i in which],
-                show_labels=True,
-                colors=[tints[i] for i in which],
-                radii=rr.Radius.ui_points(1.0),
-            )
-            entries.append(Entry("/graph/notes", t, texts))
-        return entries
+        self._states, self._drawn = states, drawn
+        return entries + self._write(snapshot, links) + self._write_names()
 
-    def _color(self, link: LinkState | None) -> Color:
+    def _state(self, link: LinkState | None) -> int:
         if link is not None and link.cut:
-            return CUT
-        return FRESH if link is not None and link.age <= self._subject.stale_after else STALE
+            return _CUT
+        return _FRESH if link is not None and link.age <= self._subject.stale_after else _STALE
 
-    def _loss(self, links: list[LinkState | None]) -> list[float]:
+    def _look(self, states: NDArray[np.int_]) -> tuple[NDArray[np.uint8], rr.components.RadiusBatch]:
+        """Colours and widths of edges."""
+        thin = 0.5 if self._detail.crowded else 1.0
+        return _TINTS[states], rr.Radius.ui_points(np.where(states == _FRESH, thin, 2.0))
+
+    def _in_sight(self, states: NDArray[np.int_]) -> NDArray[np.intp]:
+        """Edges that are drawn among the aircraft: in a big swarm those of the ones in full, and those without news."""
+        if not self._detail.crowded:
+            return np.arange(len(self._edges))
+        full = np.isin(self._uavs, self._detail.shown)
+        return np.flatnonzero(full[self._ends].all(axis=1) | (states != _FRESH))
+
+    def _write(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
+        """What is wrong with edges; in a big swarm at one edge to a receiver, and at `_NOTES` at most."""
+        loss = self._loss(links)
+        notes: dict[int, str] = {}
+        receivers: set[int] = set()
+        wrong = np.flatnonzero((self._states != _FRESH) | (loss > _LOSSY))
+        if self._detail.crowded:
+            wrong = wrong[np.argsort(-self._states[wrong], kind="stable")]
+        for edge in wrong.tolist():
+            receiver = self._edges[edge][1]
+            if _silent(receiver, snapshot) or (self._detail.crowded and receiver in receivers):
+                continue
+            notes[edge] = _note(links[edge], int(self._states[edge]), float(loss[edge]))
+            receivers.add(receiver)
+            if self._detail.crowded and len(notes) >= _NOTES:
+                break
+        if notes == self._notes:
+            return []
+        self._notes = notes
+        which = list(notes)
+        texts = rr.Points2D(
+            self._plan_notes[which],
+            labels=list(notes.values()),
+            show_labels=True,
+            colors=_TINTS[self._states[which]],
+            radii=rr.Radius.ui_points(1.0),
+        )
+        return [Entry("/graph/notes", snapshot.t, texts)]
+
+    def _write_names(self) -> list[Entry]:
+        """Names in the plan of a big swarm: of those who are drawn in full."""
+        if not self._detail.crowded or self._named == self._detail.shown:
+            return []
+        self._named = list(self._detail.shown)
+        tints = colors(self._uavs)
+        names = rr.Points2D(
+            [self._plan[uav] for uav in self._named],
+            colors=[tints[uav] for uav in self._named],
+            radii=rr.Radius.ui_points(6.0),
+            labels=[self._name(uav) for uav in self._named],
+            show_labels=True,
+            draw_order=21.0,
+        )
+        return [Entry("/graph/names", None, names)]
+
+    def _name(self, uav: int) -> str:
+        return f"UAV {uav}" + (" leader" if uav in self._subject.leaders else "")
+
+    def _loss(self, links: list[LinkState | None]) -> NDArray[np.float64]:
         """Share of the records of each edge that were lost of late."""
         now = np.array([(link.received, link.lost) if link is not None else (0, 0) for link in links], float)
         self._recent += np.maximum(now - self._counted, 0.0) - self._recent / _FORGET
         self._counted = now
         total = self._recent.sum(axis=1)
-        return np.divide(self._recent[:, 1], total, out=np.zeros(len(links)), where=total > 0.5).tolist()  # type: ignore[no-any-return]
+        share: NDArray[np.float64] = np.divide(self._recent[:, 1], total, out=np.zeros(len(links)), where=total > 0.5)
+        return share
 
 
 def _link(uavs: Mapping[int, UavState], sender: int, receiver: int) -> LinkState | None:
@@ -133,10 +195,10 @@ def _silent(receiver: int, snapshot: Snapshot) -> bool:
     return state is not None and bool(silent_since(state, snapshot))
 
 
-def _note(link: LinkState | None, tint: Color, loss: float) -> str:
+def _note(link: LinkState | None, state: int, loss: float) -> str:
     """What is wrong with an edge. Rounded, so that the text changes rarely."""
-    if tint == FRESH:
-        return f"{10 * round(10.0 * loss)} %" if loss > 0.05 else ("1 %" if loss > _LOSSY else "")
+    if state == _FRESH:
+        return f"{10 * round(10.0 * loss)} %" if loss > 0.05 else "1 %"
     if link is None or math.isinf(link.age):
         return "cut, never heard" if link is not None and link.cut else "not heard yet"
     return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s"
@@ -148,11 +210,12 @@ def _plan(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:
     angles = {uav: -0.5 * math.pi + 2.0 * math.pi * i / len(ring) for i, uav in enumerate(ring)}
     places = {uav: (math.cos(a), math.sin(a)) for uav, a in angles.items()}
     taken: list[float] = []
+    apart = min(0.4, 0.7 * math.pi / max(1, len(leaders)))
     for leader in sorted(leaders - set(ring)):
         heard_at = [places[uav] for uav in graph.receivers(leader) if uav in places]
         angle = math.atan2(sum(y for _, y in heard_at), sum(x for x, _ in heard_at)) if heard_at else -0.5 * math.pi
-        while any(abs(math.remainder(angle - other, 2.0 * math.pi)) < 0.4 for other in taken):
-            angle += 0.2
+        while any(abs(math.remainder(angle - other, 2.0 * math.pi)) < apart for other in taken):
+            angle += 0.5 * apart
         taken.append(angle)
         places[leader] = (1.55 * math.cos(angle), 1.55 * math.sin(angle))
     return places

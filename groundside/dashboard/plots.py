@@ -8,17 +8,21 @@ from collections.abc import Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.panels import Panel, panels_of, uavs_of
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import name
 from ftcc.groundside.palette import GRAY, Color, colors
-from ftcc.groundside.snapshot import Snapshot
+from ftcc.groundside.snapshot import Snapshot, UavState
 
 __all__ = ["WINDOW", "Plots", "time_series"]
 
 WINDOW = 60.0
 """Time that the plots show, s."""
+
+_REACH: Color = (158, 164, 172)
+"""Of curves that tell how far all UAVs of a big swarm reach."""
 
 Curve = tuple[str, Color, float]
 """Name, colour, width."""
@@ -27,15 +31,18 @@ Curve = tuple[str, Color, float]
 class Plots:
     """Draws the panels of a swarm."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
+        self._detail = detail
+        self._leaders_at_first = {uav for uav in detail.shown if uav in subject.leaders}
         self._colors = colors(subject.graph.uavs)
         self._groups = panels_of(subject)
         self._panels = [panel for panels in self._groups.values() for panel in panels]
 
     def views(self) -> dict[str, list[rrb.View]]:
         """One view to a panel, by group."""
-        return {group: [_view(panel) for panel in panels] for group, panels in self._groups.items()}
+        pale = self._detail.crowded
+        return {group: [_view(panel, pale) for panel in panels] for group, panels in self._groups.items()}
 
     def static(self) -> list[Entry]:
         """Names, colours and widths of all series."""
@@ -45,10 +52,11 @@ class Plots:
             entries.append(Entry(_curves_of(panel), None, rr.SeriesLines(names=names, colors=tints, widths=widths)))
         return entries
 
-    def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """The values of one instant."""
+    def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
+        """The values of one instant; ``new`` are those that have just come into view."""
         t = snapshot.t
-        entries = [Entry(_curves_of(panel), t, rr.Scalars(self._values(panel, snapshot))) for panel in self._panels]
+        entries = self.static() if new else []
+        entries += [Entry(_curves_of(panel), t, rr.Scalars(self._values(panel, snapshot))) for panel in self._panels]
         for panel in self._panels:
             if panel.band:
                 entries += self._band(panel, snapshot)
@@ -56,27 +64,33 @@ class Plots:
 
     def _curves(self, panel: Panel) -> list[Curve]:
         """What `_values` gives, in the same order."""
-        uavs = uavs_of(panel, self._subject)
+        uavs = self._uavs(panel)
         leaders = self._subject.leaders
-        curves = [(name(uav), self._colors[uav], 2.5 if uav in leaders else 1.5) for uav in uavs]
+        curves = [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
         if panel.second is not None:
-            curves += [(f"{name(uav)} {panel.second[1]}", self._colors[uav], 0.7) for uav in self._followers(uavs)]
+            curves += [self._curve(uav, f" {panel.second[1]}", 0.7) for uav in self._followers(uavs)]
         if isinstance(panel.bound, str):
             for side in ("upper", "lower"):
-                curves += [(f"{name(uav)} {side} bound", GRAY, 1.0) for uav in self._followers(uavs)]
+                bounds = [self._curve(uav, f" {side} bound", 1.0) for uav in self._followers(uavs)]
+                curves += [(called, GRAY, width) for called, _, width in bounds]
         elif panel.bound is not None:
             curves += [("upper bound", GRAY, 1.0), ("lower bound", GRAY, 1.0)]
         if panel.limits is not None:
             curves += [("lower limit", GRAY, 1.0), ("upper limit", GRAY, 1.0)]
         if panel.obstacles:
             curves.append(("top of the obstacle", GRAY, 5.0))
+        if self._detail.crowded:
+            curves += [("lowest of all", _REACH, 1.0), ("highest of all", _REACH, 1.0)]
         return curves
 
+    def _curve(self, uav: int | None, what: str, width: float) -> Curve:
+        """A curve of a UAV, or one that is kept for whoever comes into view."""
+        return ("", GRAY, width) if uav is None else (name(uav) + what, self._colors[uav], width)
+
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
-        uavs = uavs_of(panel, self._subject)
-        states = [snapshot.uavs.get(uav) for uav in uavs]
-        values = [panel.read(panel.value, state) for state in states]
-        followers = [snapshot.uavs.get(uav) for uav in self._followers(uavs)]
+        uavs = self._uavs(panel)
+        values = [panel.read(panel.value, _state(snapshot, uav)) for uav in uavs]
+        followers = [_state(snapshot, uav) for uav in self._followers(uavs)]
         if panel.second is not None:
             values += [panel.read(panel.second, state) for state in followers]
         if isinstance(panel.bound, str):
@@ -87,14 +101,26 @@ class Plots:
         if panel.limits is not None:
             values += [limit * panel.scale for limit in panel.limits]
         if panel.obstacles:
-            places = [state.truth["x"] for state in states if state is not None]
+            places = [state.truth["x"] for state in snapshot.uavs.values()]
             beneath = [o.top for o in self._subject.obstacles if any(o.start < x < o.end for x in places)]
             values.append(max(beneath, default=math.nan))
+        if self._detail.crowded:
+            everybody = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
+            told = [value for value in everybody if math.isfinite(value)]
+            values += [min(told, default=math.nan), max(told, default=math.nan)]
         return values
 
-    def _followers(self, uavs: Sequence[int]) -> list[int]:
-        leaders = self._subject.leaders
-        return [uav for uav in uavs if uav not in leaders]
+    def _uavs(self, panel: Panel) -> list[int | None]:
+        """Whose curves these are; None keeps a place for whoever comes into view."""
+        detail, leaders = self._detail, self._subject.leaders
+        places = [*detail.shown, *[None] * (detail.room - len(detail.shown))]
+        if panel.everybody:
+            return places
+        # Places must not move: a leader that comes into view later leaves an empty one.
+        return [None if uav in leaders else uav for uav in places if uav not in self._leaders_at_first]
+
+    def _followers(self, uavs: Sequence[int | None]) -> list[int | None]:
+        return [None if uav in self._subject.leaders else uav for uav in uavs if uav not in self._leaders_at_first]
 
     def _band(self, panel: Panel, snapshot: Snapshot) -> list[Entry]:
         """What lies between the leaders. Rerun shades one standard deviation about a measured value."""
@@ -113,9 +139,14 @@ def _curves_of(panel: Panel) -> str:
     return f"{panel.path}/uavs" if panel.band else panel.path
 
 
-def _view(panel: Panel) -> rrb.View:
+def _state(snapshot: Snapshot, uav: int | None) -> UavState | None:
+    return None if uav is None else snapshot.uavs.get(uav)
+
+
+def _view(panel: Panel, reach: bool) -> rrb.View:
     unit = f", {panel.shown_unit}" if panel.unit != "-" else ""
-    notes = f" ({', '.join(panel.notes)})" if panel.notes else ""
+    said = [*panel.notes, *(["pale: lowest and highest of all"] if reach else [])]
+    notes = f" ({', '.join(said)})" if said else ""
     return time_series(panel.path, f"{panel.title}{unit}{notes}")
 
 

@@ -6,20 +6,21 @@ The world's axes are east, north and up, which are right-handed; x (north) and y
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.links import Links
-from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline
+from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.surroundings import Surroundings
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import label
-from ftcc.groundside.palette import colors
+from ftcc.groundside.palette import Color, colors
 from ftcc.groundside.snapshot import Snapshot, UavState
 
 __all__ = ["LANE", "TRAIL", "Scene"]
@@ -46,8 +47,9 @@ class Scene:
     longitudinal schemes do, are moved east by `LANE` each.
     """
 
-    def __init__(self, subject: Subject, first: Snapshot) -> None:
+    def __init__(self, subject: Subject, first: Snapshot, detail: Detail) -> None:
         self._subject = subject
+        self._detail = detail
         self._uavs = sorted(subject.graph.uavs)
         self._leaders = set(subject.leaders)
         self._colors = colors(self._uavs)
@@ -72,7 +74,9 @@ class Scene:
             if names & set(signals)
         }
         self._surroundings = Surroundings(subject, self._positions)
-        self.links = Links(subject)
+        self.links = Links(subject, detail)
+        self._others: list[int] = []
+        """Who was drawn as a stick last."""
         self._labels: dict[int, str] = {}
         self._poses = Poses()
 
@@ -109,11 +113,18 @@ class Scene:
 
     def static(self) -> list[Entry]:
         """Shapes and colours."""
-        tints = [self._colors[uav] for uav in self._uavs]
-        entries = [Entry("/world", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
+        width = rr.Radius.ui_points(0.75)
+        trails = rr.LineStrips3D.from_fields(colors=self._trail_colors(), radii=width)
+        entries = [Entry("/world", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP), *self._shapes(self._detail.shown)]
+        entries.append(Entry("/world/trails", None, trails))
+        return entries + self._surroundings.static() + self.links.static()
+
+    def _shapes(self, uavs: Iterable[int]) -> list[Entry]:
+        """What is drawn of UAVs in full."""
+        entries = []
         vertices, normals = airframe(self._scale)
         strips = outline(self._scale)
-        for uav in self._uavs:
+        for uav in uavs:
             shape = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=self._colors[uav])
             entries.append(Entry(f"/world/uav/{uav}/airframe", None, shape))
             above = rr.Points3D(
@@ -123,28 +134,32 @@ class Scene:
             if self._references and uav not in self._leaders:
                 ghost = rr.LineStrips3D(strips, colors=self._colors[uav], radii=rr.Radius.ui_points(0.6))
                 entries.append(Entry(f"/world/reference/{uav}/outline", None, ghost))
-        width = rr.Radius.ui_points(0.75)
-        entries.append(Entry("/world/trails", None, rr.LineStrips3D.from_fields(colors=tints, radii=width)))
-        return entries + self._surroundings.static() + self.links.static()
+        return entries
 
-    def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """Everything that moves."""
+    def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
+        """Everything that moves; ``new`` are those that have just come into view."""
         t = snapshot.t
         before = self._positions.copy()
         self._place(snapshot)
         after = self._positions
         seen = np.isfinite(after[:, 0])
         if seen.any():
-            self._centre = after[seen].mean(axis=0)
+            # Those of a big swarm that are left behind must not drag the view along.
+            middle = np.median if self._detail.crowded else np.mean
+            self._centre = middle(after[seen], axis=0)
         entries = [Entry("/world/centre", t, rr.Transform3D(translation=self._centre))]
-        for uav, state in snapshot.uavs.items():
-            if uav in self._index and np.isfinite(after[self._index[uav], 0]):
-                place = after[self._index[uav]]
+        if new:
+            entries += self._shapes(new)
+            entries.append(Entry("/world/trails", t, rr.LineStrips3D.from_fields(colors=self._trail_colors())))
+        for uav in self._detail.shown:
+            state = snapshot.uavs.get(uav)
+            place = after[self._index[uav]]
+            if state is not None and math.isfinite(place[0]):
                 entries.append(Entry(f"/world/uav/{uav}", t, self._poses.of(place, state.truth)))
                 entries += self._reference(t, uav, state)
         before = np.where(np.isfinite(before), before, after)
-        entries.append(Entry("/world/trails", t, rr.LineStrips3D.from_fields(strips=np.stack([before, after], axis=1))))
-        for uav in self._uavs:
+        entries += self._trails(t, before, after) + self._sticks(snapshot)
+        for uav in self._detail.shown:
             text = label(uav, uav in self._leaders, snapshot)
             if text != self._labels.get(uav):
                 self._labels[uav] = text
@@ -153,12 +168,45 @@ class Scene:
         entries += self._surroundings.draw(snapshot, after)
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 
+    def _trail_colors(self) -> list[Color]:
+        return [self._colors[uav] for uav in self._detail.shown]
+
+    def _trails(self, t: float, before: NDArray[np.float64], after: NDArray[np.float64]) -> list[Entry]:
+        """The way of those drawn in full since the last picture."""
+        rows = [self._index[uav] for uav in self._detail.shown]
+        ways = np.stack([before[rows], after[rows]], axis=1)
+        return [Entry("/world/trails", t, rr.LineStrips3D.from_fields(strips=ways))]
+
+    def _sticks(self, snapshot: Snapshot) -> list[Entry]:
+        """All others, in one call."""
+        if not self._detail.crowded:
+            return []
+        full = set(self._detail.shown)
+        others = [
+            uav for uav, row in self._index.items()
+            if uav not in full and uav in snapshot.uavs and math.isfinite(self._positions[row, 0])
+        ]  # fmt: skip
+        places = self._positions[[self._index[uav] for uav in others]]
+        strips = sticks(places, [snapshot.uavs[uav].truth for uav in others], self._scale)
+        drawn = rr.LineStrips3D.from_fields(strips=strips)
+        if others != self._others:
+            self._others = others
+            drawn = rr.LineStrips3D.from_fields(
+                strips=strips, colors=stick_colors(self._colors, others), radii=rr.Radius.ui_points(1.0)
+            )
+        return [Entry("/world/others", snapshot.t, drawn)]
+
     def _place(self, snapshot: Snapshot) -> None:
-        for uav, state in snapshot.uavs.items():
-            if uav in self._index:
-                here = self._where(uav, state.truth)
-                if np.isfinite(here).all():
-                    self._positions[self._index[uav]] = here
+        told = [
+            (self._index[uav], state.truth["y"], state.truth["x"], state.truth["z"])
+            for uav, state in snapshot.uavs.items()
+            if uav in self._index
+        ]
+        values = np.array(told, dtype=np.float64).reshape(-1, 4)
+        values = values[np.isfinite(values).all(axis=1)]
+        rows = values[:, 0].astype(int)
+        self._positions[rows] = values[:, 1:]
+        self._positions[rows, 0] += self._lanes[rows]
 
     def _where(self, uav: int, truth: Mapping[str, float]) -> NDArray[np.float64]:
         return np.array((truth["y"] + self._lanes[self._index[uav]], truth["x"], truth["z"]))

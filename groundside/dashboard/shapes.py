@@ -9,11 +9,12 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from ftcc.link.rotation import quaternion_product
+from ftcc.groundside.palette import Color
+from ftcc.link.rotation import body_attitude, body_axes, quaternion_product
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import STATE_MESSAGE, encode_state
 
-__all__ = ["SPAN", "Poses", "airframe", "arrows", "outline"]
+__all__ = ["SPAN", "Poses", "airframe", "arrows", "outline", "stick_colors", "sticks"]
 
 # Airframe, m: x forward, y right, z down; corners of flat parts, each a fan of triangles.
 SPAN = 3.24
@@ -27,6 +28,15 @@ _PARTS = (
 _BODY = ((1.0, 0.0, 0.0), 0.3, 0.14, (-1.3, 0.0, -0.05))
 """Nose, station and half-width of the thickest section, tail."""
 
+_STICKS = (
+    ((-1.3, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ((0.0, -1.62, 0.0), (0.0, 1.62, 0.0)),
+    ((-1.1, 0.0, 0.0), (-1.3, 0.0, -0.55)),
+)
+"""Fuselage, wing and fin of an aircraft from afar."""
+
+_ANGLES = ("chi", "gamma", "mu", "alpha", "beta")
+"""Of `body_attitude`."""
 _NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 """Rotation from north-east-down to east-north-up as a quaternion, scalar first."""
 
@@ -50,6 +60,31 @@ class Poses:
         encode_state(np.array([truth.get(field, 0.0) for field in TRUTH]), self._message)
         w, x, y, z = quaternion_product(*turn, *quaternion_product(*_NORTH_TO_WORLD, *self._message[:4]))
         return rr.Transform3D(translation=place, quaternion=rr.Quaternion(xyzw=(x, y, z, w)))
+
+
+def sticks(
+    places: NDArray[np.float64],
+    truths: Sequence[Mapping[str, float]],
+    scale: float,
+    turns: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Aircraft from afar, three lines each: shape (3 n, 2, 3).
+
+    ``places`` (n, 3) and attitudes are as those of `Poses`; ``turns`` (n, 3, 3) are further rotations.
+    """
+    angles = [[truth.get(name, 0.0) for name in _ANGLES] for truth in truths]
+    axes = np.array([body_axes(*body_attitude(*five)) for five in angles]).reshape(-1, 3, 3)
+    # Rows are nose, right wing and belly: from north, east, down to east, north, up.
+    axes = axes[:, :, [1, 0, 2]] * (1.0, 1.0, -1.0)
+    if turns is not None:
+        axes = axes @ turns.transpose(0, 2, 1)
+    ends = np.array(_STICKS).reshape(-1, 3) * scale
+    return (ends @ axes + places[:, None]).reshape(-1, 2, 3)
+
+
+def stick_colors(tints: Mapping[int, Color], uavs: Sequence[int]) -> NDArray[np.uint8]:
+    """Colours of the `sticks` of UAVs, shape (3 n, 3)."""
+    return np.repeat(np.array([tints[uav] for uav in uavs], np.uint8).reshape(-1, 3), len(_STICKS), axis=0)
 
 
 def arrows(

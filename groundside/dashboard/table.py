@@ -8,24 +8,28 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import in_words
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import faults, name, silent_since
+from ftcc.groundside.dashboard.words import faults, faulty, in_trouble, is_silent, name, silent_since
 from ftcc.groundside.snapshot import Event, Snapshot, UavState
 
 __all__ = ["Table", "events", "log_view"]
 
 _EVERY = 10
 """Snapshots from one table to the next."""
+_MOST = 24
+"""Rows for UAVs in trouble, in a big swarm."""
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class Table:
     """Writes the table once in a while; it is text, and dearer than a curve."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
+        self._detail = detail
         self._in = 0
 
     def view(self) -> rrb.TextDocumentView:
@@ -42,11 +46,36 @@ class Table:
 
     def _text(self, snapshot: Snapshot) -> str:
         heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks", "mode")
-        rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in sorted(self._subject.graph.uavs))]
+        rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in self._in_rows(snapshot))]
         # A recording knows no modes.
         shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
-        pace = [in_words(snapshot.pace), ""] if snapshot.pace is not None else []
-        return "\n".join([*pace, *(f"| {' | '.join(row[:shown])} |" for row in rows)])
+        above = [in_words(snapshot.pace)] if snapshot.pace is not None else []
+        above += [self._summary(snapshot)] if self._detail.crowded else []
+        return "\n".join([*(f"{line}\n" for line in above), *(f"| {' | '.join(row[:shown])} |" for row in rows)])
+
+    def _in_rows(self, snapshot: Snapshot) -> list[int]:
+        """Whom the table tells of: everybody; of a big swarm those in trouble, then the others drawn in full."""
+        uavs = sorted(self._subject.graph.uavs)
+        if not self._detail.crowded:
+            return uavs
+        states = snapshot.uavs
+        worst = [uav for uav in uavs if uav not in states or in_trouble(states[uav], snapshot)][:_MOST]
+        return worst + [uav for uav in sorted(self._detail.shown) if uav not in worst]
+
+    def _summary(self, snapshot: Snapshot) -> str:
+        """A big swarm in one line."""
+        uavs, states = self._subject.graph.uavs, snapshot.uavs.values()
+        silent = sum(is_silent(state, snapshot) for state in states)
+        counts = {
+            "not heard": len(uavs) - len(states),
+            "silent": silent,
+            "with faults": sum(bool(faulty(state)) for state in states),
+            "late ticks": sum(state.late for state in states),
+        }
+        told = "".join(f", {count} {what}" for what, count in counts.items() if count)
+        altitudes = [state.truth["z"] for state in states]
+        reach = f", {min(altitudes):.0f} to {max(altitudes):.0f} m" if altitudes else ""
+        return f"{len(uavs)} UAVs{told or ', all healthy'}{reach}"
 
     def _row(self, uav: int, snapshot: Snapshot) -> tuple[str, ...]:
         leads = uav in self._subject.leaders

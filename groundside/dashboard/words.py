@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ftcc.groundside.snapshot import Snapshot, UavState
 
-__all__ = ["faults", "faulty", "label", "name", "silent_since"]
+__all__ = ["faults", "faulty", "in_trouble", "is_silent", "label", "name", "silent_since"]
 
 _SILENT = 1.0
-"""Age of a UAV's telemetry from which it counts as silent, s."""
+"""Age of a UAV's telemetry from which it counts as silent, s; of wall time where it flies faster than that."""
 
 
 def name(uav: int) -> str:
@@ -42,4 +42,18 @@ def faulty(uav: UavState) -> list[str]:
 
 def silent_since(uav: UavState, snapshot: Snapshot) -> str:
     """That a UAV has fallen silent; empty if it has not."""
-    return f"silent since {uav.t:.0f} s" if snapshot.t - uav.t > _SILENT else ""
+    return f"silent since {uav.t:.0f} s" if is_silent(uav, snapshot) else ""
+
+
+def is_silent(uav: UavState, snapshot: Snapshot) -> bool:
+    """Whether a UAV has fallen silent.
+
+    Telemetry comes ten times a second of wall time at most, so that in a fast swarm it is older in simulated time.
+    """
+    fast = snapshot.pace.factor if snapshot.pace is not None and snapshot.pace.factor > 1.0 else 1.0
+    return snapshot.t - uav.t > _SILENT * fast
+
+
+def in_trouble(uav: UavState, snapshot: Snapshot) -> bool:
+    """Whether something is wrong with a UAV: a fault of an actuator, or silence."""
+    return is_silent(uav, snapshot) or bool(faulty(uav))

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from ftcc.groundside.dashboard.attitudes import Attitudes
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.snapshot import Snapshot
 from tests.groundside.synthetic_swarm import SUBJECT, snapshot
 
 BANK, WANTED = 0.5, 0.2
-VIEW = Attitudes(replace(SUBJECT, family="attitude"))
+VIEW = Attitudes(replace(SUBJECT, family="attitude"), Detail(SUBJECT))
 
 
 def banked(course: float, **signals: float) -> Snapshot:

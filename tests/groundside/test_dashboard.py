@@ -21,6 +21,7 @@ import pytest
 import rerun as rr
 
 from ftcc.groundside.dashboard import Dashboard
+from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import in_words
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import LANE
@@ -148,7 +149,7 @@ def test_series_are_named_and_coloured_by_uav(recording: Path) -> None:
 
 def test_an_obstacle_is_drawn_beneath_the_altitudes_of_those_who_are_above_it() -> None:
     subject = dataclasses.replace(SUBJECT, obstacles=(Obstacle(250.0, 350.0, 870.0),))
-    plots = Plots(subject)
+    plots = Plots(subject, Detail(subject))
     before, above = ({entry.path: entry.what for entry in plots.draw(snapshot(t))} for t in (5.0, 10.0))
     assert np.isnan(before["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1])
     assert above["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1] == 870.0
