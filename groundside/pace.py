@@ -20,7 +20,7 @@ import psutil  # type: ignore[import-untyped]
 
 from ftcc.groundside.snapshot import Pace
 
-__all__ = ["Kind", "Member", "PaceMeter", "Sample", "Setup", "judge", "loads", "usable_cores"]
+__all__ = ["Kind", "Member", "PaceMeter", "Sample", "Setup", "judge", "loads", "processes_of", "usable_cores"]
 
 Kind = Literal["vehicle", "autopilot", "ground station", "viewer"]
 """What a process of a swarm is."""
@@ -98,6 +98,23 @@ def _bound_to() -> Collection[int]:
     if hasattr(os, "sched_getaffinity"):
         return os.sched_getaffinity(0)
     return range(os.cpu_count() or 1)
+
+
+def processes_of(folder: Path, launcher: int) -> list[tuple[str, int, Kind]]:
+    """Name, pid and kind of the vehicle and autopilot processes of the run in ``folder``, by the logs they write.
+
+    For whoever has not started them, but knows the pid of their ``launcher``.
+    """
+    logs = {str(path): path.stem for path in (folder.resolve() / "logs").glob("*.log")}
+    found: list[tuple[str, int, Kind]] = []
+    for process in psutil.Process(launcher).children(recursive=True):
+        try:
+            names = [logs[file.path] for file in process.open_files() if file.path in logs]
+        except psutil.NoSuchProcess:
+            continue
+        for name in names[:1]:
+            found.append((name, process.pid, "vehicle" if name.endswith("-vehicle") else "autopilot"))
+    return found
 
 
 def loads(earlier: Sample, later: Sample) -> dict[Member, float]:
