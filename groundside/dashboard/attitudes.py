@@ -23,6 +23,8 @@ __all__ = ["Attitudes"]
 
 _SPACING, _RISE = 1.4 * SPAN, 0.7 * SPAN
 """Between aircraft of a row, and from row to row, m."""
+_RISE_CROWDED = 1.0 * SPAN
+"""From row to row in a big swarm, where labels are large beside the aircraft, m."""
 _REFERENCES = {"mu": "mu_d", "alpha": "alpha_d", "beta": "beta_d"}
 """Signals that say how a UAV should lie in the air, by the true state that they stand for."""
 
@@ -42,16 +44,21 @@ class Attitudes:
         self._uavs = sorted(subject.graph.uavs)
         self._colors = colors(self._uavs)
         self._leaders = set(subject.leaders)
+        rise = _RISE_CROWDED if detail.crowded else _RISE
+        self._above = 0.45 * rise if detail.crowded else 0.3 * SPAN
+        """Height of a label over its aircraft, m."""
         rows = math.ceil(math.sqrt(0.5 * len(self._uavs)))
         columns = math.ceil(len(self._uavs) / rows)
         self._slots = {
-            uav: ((i % columns - 0.5 * (columns - 1)) * _SPACING, 0.0, (0.5 * (rows - 1) - i // columns) * _RISE)
+            uav: ((i % columns - 0.5 * (columns - 1)) * _SPACING, 0.0, (0.5 * (rows - 1) - i // columns) * rise)
             for i, uav in enumerate(self._uavs)
         }
-        self._eye = 1.3 * max(rows * _RISE, 0.5 * columns * _SPACING) * np.array([0.0, -1.0, 0.3])
+        self._eye = 1.3 * max(rows * rise, 0.5 * columns * _SPACING) * np.array([0.0, -1.0, 0.3])
         self._turns = {uav: _turn(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()}
         self._poses = Poses()
         self._labels: dict[int, str] = {}
+        self._ghosts: set[int] = set()
+        """Who has an outline."""
         self._others: list[int] = []
         """Who was drawn as a stick last."""
 
@@ -77,14 +84,9 @@ class Attitudes:
         for uav in uavs:
             tint = self._colors[uav]
             shape = rr.Mesh3D(vertex_positions=vertices, vertex_normals=normals, albedo_factor=tint)
-            ghost = rr.LineStrips3D(outline(1.0), colors=tint, radii=rr.Radius.ui_points(0.8))
             x, y, z = self._slots[uav]
-            above = rr.Points3D((x, y, z + 0.3 * SPAN), colors=tint, radii=rr.Radius.ui_points(0.5))
-            entries += [
-                Entry(f"/attitudes/uav/{uav}", None, shape),
-                Entry(f"/attitudes/reference/{uav}", None, ghost),
-                Entry(f"/attitudes/label/{uav}", None, above),
-            ]
+            above = rr.Points3D((x, y, z + self._above), colors=tint, radii=rr.Radius.ui_points(0.5))
+            entries += [Entry(f"/attitudes/uav/{uav}", None, shape), Entry(f"/attitudes/label/{uav}", None, above)]
         return entries
 
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
@@ -106,8 +108,17 @@ class Attitudes:
             wanted = {name: state.signals.get(signal, math.nan) for name, signal in _REFERENCES.items()}
             if all(map(math.isfinite, wanted.values())):
                 pose = self._poses.of(slot, {**ahead, **wanted}, turn)
+                entries += self._ghost(uav)
                 entries.append(Entry(f"/attitudes/reference/{uav}", snapshot.t, pose))
         return entries
+
+    def _ghost(self, uav: int) -> list[Entry]:
+        """The outline of a UAV that has a reference, when it is first told: before, it would have no place."""
+        if uav in self._ghosts:
+            return []
+        self._ghosts.add(uav)
+        ghost = rr.LineStrips3D(outline(1.0), colors=self._colors[uav], radii=rr.Radius.ui_points(0.8))
+        return [Entry(f"/attitudes/reference/{uav}", None, ghost)]
 
     def _sticks(self, snapshot: Snapshot) -> list[Entry]:
         """All who are not drawn in full, in one call."""

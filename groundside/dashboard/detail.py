@@ -4,7 +4,7 @@ The levels of detail, in one place:
 
 - **Up to `FULL` UAVs** every aircraft is drawn in full: its body in its attitude, trail, reference, label, edges, and a
   curve in every plot.
-- **Beyond**, at most `FULL` are: the first followers and leaders from the beginning on, and `TROUBLED` more as they get
+- **Beyond**, at most `FULL` are: a few followers and leaders from the beginning on, and `TROUBLED` more as they get
   into trouble, which is a fault of an actuator or silence. Who has come into view stays there, repaired or not, so that
   a curve goes on. The others are drawn together, as sticks in their places and attitudes, by one call for all of them;
   plots show how far they reach, from the lowest to the highest; edges among them are drawn while they bring no news;
@@ -42,7 +42,9 @@ class Detail:
         """How many there may be."""
         if self.crowded:
             leaders = subject.leaders[:_LEADERS]
-            self.shown = sorted([*subject.followers[: FULL - TROUBLED - len(leaders)], *leaders])
+            room, followers = FULL - TROUBLED - len(leaders), subject.followers
+            spread = {len(followers) * i // room for i in range(room)}
+            self.shown = sorted([*(uav for i, uav in enumerate(followers) if i in spread), *leaders])
         self._known = set(self.shown)
 
     def follow(self, snapshot: Snapshot) -> list[int]:

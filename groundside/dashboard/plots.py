@@ -66,7 +66,9 @@ class Plots:
         """What `_values` gives, in the same order."""
         uavs = self._uavs(panel)
         leaders = self._subject.leaders
-        curves = [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
+        # The farther a curve is behind in this list, the farther in front it is drawn.
+        curves = [("lowest of all", _REACH, 1.0), ("highest of all", _REACH, 1.0)] if self._detail.crowded else []
+        curves += [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
         if panel.second is not None:
             curves += [self._curve(uav, f" {panel.second[1]}", 0.7) for uav in self._followers(uavs)]
         if isinstance(panel.bound, str):
@@ -79,8 +81,6 @@ class Plots:
             curves += [("lower limit", GRAY, 1.0), ("upper limit", GRAY, 1.0)]
         if panel.obstacles:
             curves.append(("top of the obstacle", GRAY, 5.0))
-        if self._detail.crowded:
-            curves += [("lowest of all", _REACH, 1.0), ("highest of all", _REACH, 1.0)]
         return curves
 
     def _curve(self, uav: int | None, what: str, width: float) -> Curve:
@@ -89,7 +89,8 @@ class Plots:
 
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
         uavs = self._uavs(panel)
-        values = [panel.read(panel.value, _state(snapshot, uav)) for uav in uavs]
+        values = self._reach(panel, snapshot) if self._detail.crowded else []
+        values += [panel.read(panel.value, _state(snapshot, uav)) for uav in uavs]
         followers = [_state(snapshot, uav) for uav in self._followers(uavs)]
         if panel.second is not None:
             values += [panel.read(panel.second, state) for state in followers]
@@ -104,11 +105,13 @@ class Plots:
             places = [state.truth["x"] for state in snapshot.uavs.values()]
             beneath = [o.top for o in self._subject.obstacles if any(o.start < x < o.end for x in places)]
             values.append(max(beneath, default=math.nan))
-        if self._detail.crowded:
-            everybody = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
-            told = [value for value in everybody if math.isfinite(value)]
-            values += [min(told, default=math.nan), max(told, default=math.nan)]
         return values
+
+    def _reach(self, panel: Panel, snapshot: Snapshot) -> list[float]:
+        """The lowest and the highest value of all whom a panel is about."""
+        everybody = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
+        told = [value for value in everybody if math.isfinite(value)]
+        return [min(told, default=math.nan), max(told, default=math.nan)]
 
     def _uavs(self, panel: Panel) -> list[int | None]:
         """Whose curves these are; None keeps a place for whoever comes into view."""
@@ -145,7 +148,7 @@ def _state(snapshot: Snapshot, uav: int | None) -> UavState | None:
 
 def _view(panel: Panel, reach: bool) -> rrb.View:
     unit = f", {panel.shown_unit}" if panel.unit != "-" else ""
-    said = [*panel.notes, *(["pale: lowest and highest of all"] if reach else [])]
+    said = [*panel.notes, *(["pale: extremes of all"] if reach else [])]
     notes = f" ({', '.join(said)})" if said else ""
     return time_series(panel.path, f"{panel.title}{unit}{notes}")
 

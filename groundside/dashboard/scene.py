@@ -19,7 +19,7 @@ from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, sti
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.surroundings import Surroundings
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import label
+from ftcc.groundside.dashboard.words import is_silent, label
 from ftcc.groundside.palette import Color, colors
 from ftcc.groundside.snapshot import Snapshot, UavState
 
@@ -29,6 +29,9 @@ TRAIL = {"containment": 5.0, "formation": 5.0, "attitude": 5.0, "fire": 40.0}
 """Length of the trails, s, by family."""
 LANE = 12.0
 """Distance at which aircraft that fly above one another are drawn side by side, m."""
+
+_RANK = 24.0
+"""Distance of the ranks in which a big swarm is drawn that flies abreast, m."""
 
 _REFERENCES: dict[str, dict[str, tuple[str, ...]]] = {
     "containment": {"x": ("x_hat",), "z": ("z_r", "zhat", "z_hat")},
@@ -44,7 +47,7 @@ class Scene:
 
     The centre moves with the swarm, so that hundreds of metres of common forward flight do not carry it out of sight;
     positions in the data are the true ones, but for lanes: aircraft that share one vertical plane, as those of
-    longitudinal schemes do, are moved east by `LANE` each.
+    longitudinal schemes do, are moved east by `LANE` each; those of a big swarm that fly abreast are put in ranks.
     """
 
     def __init__(self, subject: Subject, first: Snapshot, detail: Detail) -> None:
@@ -54,13 +57,15 @@ class Scene:
         self._leaders = set(subject.leaders)
         self._colors = colors(self._uavs)
         self._index = {uav: i for i, uav in enumerate(self._uavs)}
-        self._lanes: NDArray[np.float64] = np.zeros(len(self._uavs))
+        self._lanes: NDArray[np.float64] = np.zeros((len(self._uavs), 2))
+        """How far each is moved, east and north, m."""
+        self._ranks = 1
         self._positions = np.full((len(self._uavs), 3), np.nan)
         self._place(first)
         if len(self._uavs) > 1 and np.nanmax(self._positions[:, 0]) - np.nanmin(self._positions[:, 0]) < 1.0:
-            self._lanes += LANE * (np.arange(len(self._uavs)) - 0.5 * (len(self._uavs) - 1))
+            self._take_lanes()
             self._place(first)
-        seen = self._positions[np.isfinite(self._positions[:, 0])]
+        seen = self._seen()
         self._centre: NDArray[np.float64] = seen.mean(axis=0) if len(seen) else np.zeros(3)
         self._radius = max(30.0, float(np.linalg.norm(seen - self._centre, axis=1).max(initial=0.0)))
         apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[~np.eye(len(seen), dtype=bool)]
@@ -84,7 +89,8 @@ class Scene:
     def title(self) -> str:
         """What the view shows, for its name."""
         notes = [f"airframes x{self._scale}"] if self._scale > 1 else []
-        notes += [f"side by side at {LANE:g} m"] if self._lanes.any() else []
+        ranks = f" in {self._ranks} ranks" if self._ranks > 1 else ""
+        notes += [f"side by side at {LANE:g} m{ranks}"] if self._lanes.any() else []
         notes += ["outlines: references"] if self._references else []
         notes += self._surroundings.notes
         return "Swarm about its moving centre" + (f" ({', '.join(notes)})" if notes else "")
@@ -165,7 +171,7 @@ class Scene:
                 self._labels[uav] = text
                 shown = rr.Points3D.from_fields(labels=text, show_labels=True)
                 entries.append(Entry(f"/world/uav/{uav}/label", t, shown))
-        entries += self._surroundings.draw(snapshot, after)
+        entries += self._surroundings.draw(snapshot, self._company(snapshot))
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 
     def _trail_colors(self) -> list[Color]:
@@ -206,10 +212,38 @@ class Scene:
         values = values[np.isfinite(values).all(axis=1)]
         rows = values[:, 0].astype(int)
         self._positions[rows] = values[:, 1:]
-        self._positions[rows, 0] += self._lanes[rows]
+        self._positions[rows, :2] += self._lanes[rows]
 
     def _where(self, uav: int, truth: Mapping[str, float]) -> NDArray[np.float64]:
-        return np.array((truth["y"] + self._lanes[self._index[uav]], truth["x"], truth["z"]))
+        east, north = self._lanes[self._index[uav]]
+        return np.array((truth["y"] + east, truth["x"] + north, truth["z"]))
+
+    def _take_lanes(self) -> None:
+        """Aircraft above one another are drawn side by side, those of a big swarm in ranks."""
+        n = len(self._uavs)
+        # Where places along the flight mean something, they must stay.
+        in_ranks = self._detail.crowded and not self._subject.obstacles and np.ptp(self._seen()[:, 1]) < 1.0
+        abreast = math.ceil(math.sqrt(2 * n)) if in_ranks else n
+        rank, lane = np.divmod(np.arange(n), abreast)
+        self._ranks = int(rank[-1]) + 1
+        self._lanes[:, 0] = LANE * (lane - 0.5 * (abreast - 1))
+        self._lanes[:, 1] = -_RANK * rank
+
+    def _company(self, snapshot: Snapshot) -> NDArray[np.float64]:
+        """Positions of those about whom a frame is drawn: of a big swarm not of followers who have been left behind."""
+        if not self._detail.crowded:
+            return self._positions
+        left = [
+            self._index[uav] for uav, state in snapshot.uavs.items()
+            if uav in self._index and uav not in self._leaders and is_silent(state, snapshot)
+        ]  # fmt: skip
+        company = self._positions.copy()
+        company[left] = np.nan
+        return company
+
+    def _seen(self) -> NDArray[np.float64]:
+        seen: NDArray[np.float64] = self._positions[np.isfinite(self._positions[:, 0])]
+        return seen
 
     def _reference(self, t: float, uav: int, state: UavState) -> list[Entry]:
         """The aircraft where, or as, its law wants it."""

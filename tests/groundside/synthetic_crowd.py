@@ -82,7 +82,7 @@ def snapshot(n: int, t: float, duration: float = 60.0, abreast: bool = False) ->
         row, column = divmod(i, columns)
         alpha = 0.032 + 0.02 * math.sin(t + i)
         truth = {
-            "x": 30.0 * now - (0.5 * i if abreast else _APART * row),
+            "x": 30.0 * now - (0.0 if abreast else _APART * row),
             "y": 0.0 if abreast else _APART * (column - 0.5 * columns),
             "z": level + S1,
             "V": 30.0 + 0.1 * math.sin(t + i),
