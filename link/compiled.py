@@ -1,19 +1,16 @@
 """Compilation of laws, elements and plants, with a cache that notices every edit.
 
 numba's own cache looks only at the file of the calling function: a law would go on flying the old code of an edited
-element. Therefore the cache lies in a folder named by the hash of all sources that can be compiled together, and this
-module, which sets ``NUMBA_CACHE_DIR``, is the only one that imports numba.
+element. Therefore the cache lies in the folder of `cache`, named by the hash of all sources that can be compiled
+together, and this module, which sets ``NUMBA_CACHE_DIR``, is the only one that imports numba.
 """
 
 from __future__ import annotations
 
 import functools
-import hashlib
-import importlib.metadata
 import importlib.util
 import math
 import os
-import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +19,9 @@ from types import ModuleType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
+
+from ftcc.link import cache
+from ftcc.link.cache import SCHEME_ENTRY_POINTS
 
 __all__ = [
     "SCHEME_ENTRY_POINTS",
@@ -43,44 +43,9 @@ __all__ = [
     "width",
 ]
 
-SCHEME_ENTRY_POINTS = "ftcc.schemes"
-"""Entry-point group under which other packages offer schemes."""
-
-_KEPT_CACHES = 6
-_PACKAGES = ("link", "sim", "airside")
-
 F = TypeVar("F", bound=Callable[..., Any])
 
-
-def _source_files() -> list[Path]:
-    root = Path(__file__).resolve().parent.parent
-    found = [path for package in _PACKAGES for path in (root / package).rglob("*.py")]
-    found.append(root / "groundside" / "flight_loop.py")
-    for entry in importlib.metadata.entry_points(group=SCHEME_ENTRY_POINTS):
-        spec = importlib.util.find_spec(entry.module.split(".")[0])
-        for place in (spec.submodule_search_locations or []) if spec else []:
-            found += Path(place).rglob("*.py")
-        if spec and spec.origin and not spec.submodule_search_locations:
-            found.append(Path(spec.origin))
-    return sorted(set(found))
-
-
-def _choose_cache_folder() -> Path:
-    digest = hashlib.sha256(f"{sys.version} {importlib.metadata.version('numba')}".encode())
-    for path in _source_files():
-        digest.update(str(path).encode())
-        digest.update(path.read_bytes())
-    base = Path(os.environ.get("FTCC_CACHE_DIR") or Path.home() / ".cache" / "ftcc") / "compiled"
-    folder = base / digest.hexdigest()[:16]
-    folder.mkdir(parents=True, exist_ok=True)
-    os.utime(folder)
-    others = sorted((path for path in base.iterdir() if path != folder), key=lambda path: path.stat().st_mtime)
-    for stale in others[: max(0, len(others) - _KEPT_CACHES + 1)]:
-        shutil.rmtree(stale, ignore_errors=True)
-    return folder
-
-
-cache_folder: Path = _choose_cache_folder()
+cache_folder: Path = cache.folder()
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.link.cache import kept
 from ftcc.sim.airframe import Airframe, longitudinal_rates
 
 __all__ = ["Trim", "TrimError", "steady_climb", "trim"]
@@ -53,20 +55,28 @@ def trim(airframe: Airframe, V: float, d1: float = 0.0, d2: float = 0.0, d3: flo
     TrimError
         If there is none.
     """
+    return Trim(*_trim(tuple(map(float, airframe)), float(V), float(d1), float(d2), float(d3)))
+
+
+@functools.cache
+@kept
+def _trim(parameters: tuple[float, ...], V: float, d1: float, d2: float, d3: float) -> list[float]:
     from scipy.optimize import root  # takes longer to import than everything else here
+
+    airframe = Airframe(*parameters)
 
     def rates(unknown: NDArray[np.float64]) -> list[float]:
         alpha, elevator, thrust = (float(value) for value in unknown * _SCALE)
         V_dot, _, _, gamma_dot, _, q_dot = longitudinal_rates(
-            float(V), 0.0, alpha, 0.0, thrust, elevator, float(d1), float(d2), float(d3), airframe
+            V, 0.0, alpha, 0.0, thrust, elevator, d1, d2, d3, airframe
         )
         return [V_dot, gamma_dot, q_dot]
 
     found = root(rates, np.ones(3), tol=1e-12)
-    solution = Trim(*(float(value) for value in found.x * _SCALE))
-    if max(abs(rate) for rate in rates(found.x)) > 1e-9 or abs(solution.alpha) > _LARGEST_ALPHA:
+    alpha, elevator, thrust = (float(value) for value in found.x * _SCALE)
+    if max(abs(rate) for rate in rates(found.x)) > 1e-9 or abs(alpha) > _LARGEST_ALPHA:
         raise TrimError(f"the airframe has no level trim at {V:g} m/s with disturbances {d1:g}, {d2:g}, {d3:g}")
-    return solution
+    return [alpha, elevator, thrust]
 
 
 def steady_climb(airframe: Airframe, V: float, thrust: float) -> float:
@@ -79,12 +89,20 @@ def steady_climb(airframe: Airframe, V: float, thrust: float) -> float:
     TrimError
         If there is none.
     """
+    return _steady_climb(tuple(map(float, airframe)), float(V), float(thrust))
+
+
+@functools.cache
+@kept
+def _steady_climb(parameters: tuple[float, ...], V: float, thrust: float) -> float:
     from scipy.optimize import root
+
+    airframe = Airframe(*parameters)
 
     def rates(unknown: NDArray[np.float64]) -> list[float]:
         alpha, elevator, gamma = (float(value) for value in unknown * _SCALE_CLIMB)
         V_dot, _, _, gamma_dot, _, q_dot = longitudinal_rates(
-            float(V), gamma, gamma + alpha, 0.0, float(thrust), elevator, 0.0, 0.0, 0.0, airframe
+            V, gamma, gamma + alpha, 0.0, thrust, elevator, 0.0, 0.0, 0.0, airframe
         )
         return [V_dot, gamma_dot, q_dot]
 

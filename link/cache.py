@@ -1,0 +1,89 @@
+"""What is kept on disk from one start to the next: compiled functions, and results that take long to come by.
+
+Everything lies in one folder, named by the hash of all sources that it may depend on: an edit anywhere begins a new
+one. This module imports neither numba nor numpy, so that what is kept can be had without them.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import importlib.util
+import json
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+__all__ = ["SCHEME_ENTRY_POINTS", "folder", "kept"]
+
+SCHEME_ENTRY_POINTS = "ftcc.schemes"
+"""Entry-point group under which other packages offer schemes."""
+
+_KEPT_CACHES = 6
+_PACKAGES = ("link", "sim", "airside")
+_LIBRARIES = ("numba", "numpy", "scipy")
+"""What the contents depend on beside the sources."""
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _source_files() -> list[Path]:
+    root = Path(__file__).resolve().parent.parent
+    found = [path for package in _PACKAGES for path in (root / package).rglob("*.py")]
+    found += [path for name in ("flight_loop.py", "catalogue.py") if (path := root / "groundside" / name).is_file()]
+    for entry in importlib.metadata.entry_points(group=SCHEME_ENTRY_POINTS):
+        spec = importlib.util.find_spec(entry.module.split(".")[0])
+        for place in (spec.submodule_search_locations or []) if spec else []:
+            found += Path(place).rglob("*.py")
+        if spec and spec.origin and not spec.submodule_search_locations:
+            found.append(Path(spec.origin))
+    return sorted(set(found))
+
+
+@functools.cache
+def folder() -> Path:
+    """Where the program as it stands keeps things; the folders of all but its last few versions are cleared away."""
+    versions = [sys.version, *(importlib.metadata.version(name) for name in _LIBRARIES)]
+    digest = hashlib.sha256(" ".join(versions).encode())
+    for path in _source_files():
+        digest.update(str(path).encode())
+        digest.update(path.read_bytes())
+    base = Path(os.environ.get("FTCC_CACHE_DIR") or Path.home() / ".cache" / "ftcc") / "compiled"
+    own = base / digest.hexdigest()[:16]
+    own.mkdir(parents=True, exist_ok=True)
+    os.utime(own)
+    others = sorted((path for path in base.iterdir() if path != own), key=lambda path: path.stat().st_mtime)
+    for stale in others[: max(0, len(others) - _KEPT_CACHES + 1)]:
+        shutil.rmtree(stale, ignore_errors=True)
+    return own
+
+
+def kept(function: F) -> F:
+    """Keep the results of ``function`` on disk: it is called once for each list of arguments, not once a start.
+
+    For functions of our own that depend on their arguments and on the sources named above alone. Arguments and results
+    are what JSON holds; lists come back where there were tuples. What raises an exception is not kept. Plain Python
+    (``NUMBA_DISABLE_JIT=1``) is there to be compared with, and keeps nothing.
+    """
+
+    @functools.wraps(function)
+    def recalled(*arguments: Any) -> Any:
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+            return function(*arguments)
+        name = hashlib.sha256(json.dumps(arguments).encode()).hexdigest()[:32]
+        path = folder() / "kept" / f"{function.__module__}.{function.__name__}" / f"{name}.json"
+        try:
+            return json.loads(path.read_bytes())
+        except (FileNotFoundError, ValueError):
+            result = function(*arguments)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = path.with_suffix(f".{os.getpid()}")
+        unfinished.write_text(json.dumps(result), encoding="utf-8")
+        unfinished.replace(path)
+        return result
+
+    return recalled  # type: ignore[return-value]
