@@ -7,6 +7,7 @@ pass a forward position; they come in a fixed order, and a fired one supersedes 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from ftcc.airside.references.longitudinal import Reference
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, copy
 
 __all__ = [
     "CLAMPED",
@@ -342,24 +343,57 @@ def climb_of_step(altitude_filter: tuple[float, float], step: float) -> float:
 
 
 def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> dict[int, Any]:
-    """The leaders' profiles over a flight, by id: arrays (n, 7) in the order of `Reference`; all hear each other."""
-    period_us = round(period * 1e6)
-    count = int(duration / period) + 1
-    uavs = list(profiles)
-    arrays = {uav: profile_arrays(profile, period) for uav, profile in profiles.items()}
-    triggers = {uav: trigger_rows(profile, uav, uavs) for uav, profile in profiles.items()}
-    states = {uav: new_profile_state(profile) for uav, profile in profiles.items()}
-    rows = {uav: np.zeros((count, len(Reference._fields))) for uav in uavs}
-    row = {uav: np.zeros(len(Reference._fields)) for uav in uavs}
-    for k in range(count):
-        # What each knows of the others: their last position, carried over one period.
-        known = [row[uav][0] + row[uav][6] * period for uav in uavs]
-        for uav in uavs:
-            edge = armed(triggers[uav], states[uav])
-            seen = known[edge] if edge >= 0 and k > 0 else math.nan
-            refer(*arrays[uav], triggers[uav], states[uav], row[uav], seen, k * period_us, period_us)
-            rows[uav][k] = row[uav]
+    """The leaders' profiles over a flight, by id: arrays (n, 7) in the order of `Reference`; all hear each other.
+
+    The arrays cannot be written: who asks again gets the same ones.
+    """
+    if not profiles:
+        return {}
+    return dict(zip(profiles, _sampled(tuple(profiles.items()), duration, period), strict=True))
+
+
+@functools.lru_cache(maxsize=8)
+def _sampled(profiles: tuple[tuple[int, Profile], ...], duration: float, period: float) -> NDArray[np.float64]:
+    uavs = [uav for uav, _ in profiles]
+    arrays = [profile_arrays(profile, period) for _, profile in profiles]
+    waits = [trigger_rows(profile, uav, uavs) for uav, profile in profiles]
+    commands = np.full(
+        (
+            len(uavs),
+            max(
+                (len(rows) for _, rows in arrays),
+            ),
+            3,
+        ),
+        math.inf,
+    )
+    triggers = np.full((len(uavs), max((1, *map(len, waits))), TRIGGER_COLUMNS), math.inf)
+    for i, ((_, given), awaited) in enumerate(zip(arrays, waits, strict=True)):
+        commands[i, : len(given)] = given
+        triggers[i, : len(awaited)] = awaited
+    parameters = np.array([row for row, _ in arrays])
+    states = np.array([new_profile_state(profile) for _, profile in profiles])
+    width = len(Reference._fields)
+    rows = np.zeros((len(uavs), int(duration / period) + 1, width))
+    seen = np.zeros(len(uavs))
+    _sample(parameters, commands, triggers, states, np.zeros((len(uavs), width)), seen, round(period * 1e6), rows)
+    rows.flags.writeable = False
     return rows
+
+
+@compiled
+def _sample(parameters, commands, triggers, states, row, seen, period_us, rows):  # type: ignore[no-untyped-def]
+    """Fly all profiles tick by tick into ``rows`` (k, n, 7); ``row`` (k, 7) and ``seen`` (k,) are scratch."""
+    period = period_us / 1e6
+    for n in range(rows.shape[1]):
+        # What each knows of the others: their last position, carried over one period.
+        for i in range(rows.shape[0]):
+            seen[i] = row[i, 0] + row[i, 6] * period
+        for i in range(rows.shape[0]):
+            edge = armed(triggers[i], states[i])
+            position = seen[edge] if edge >= 0 and n > 0 else math.nan
+            refer(parameters[i], commands[i], triggers[i], states[i], row[i], position, n * period_us, period_us)
+            copy(row[i], rows[i, n])
 
 
 def climb_range(profiles: Mapping[int, Profile], duration: float) -> dict[int, tuple[float, float]]:
