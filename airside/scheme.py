@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -89,14 +90,15 @@ class Problem(NamedTuple):
     text: str
 
 
-def quantities(record: Any) -> dict[str, Quantity]:
+@functools.cache
+def quantities(record: Any) -> Mapping[str, Quantity]:
     """The `Quantity` that annotates each field of the NamedTuple class ``record``, by field name."""
     found = {}
     for name, hint in get_type_hints(record, include_extras=True).items():
         for note in getattr(hint, "__metadata__", ()):
             if isinstance(note, Quantity):
                 found[name] = note
-    return found
+    return MappingProxyType(found)
 
 
 _REQUIRED = ("Gains", "State", "Output", "SHARED", "GRAPH", "COMMANDS", "start", "step", "share")

@@ -1,4 +1,4 @@
-"""Scenarios: finding and reading the files, merging form, variants and settings, and saying clearly what is wrong.
+"""Scenarios: merging the form, variants and settings of a file, and saying clearly what is wrong with it.
 
 A file holds what all flights share, ``[form.NAME]`` and ``[variant.NAME]`` blocks with what they change, and claims. A
 variant may hold ``[variant.NAME.FORM]`` with what it changes in that form alone. Merged in the order: file, form,
@@ -7,6 +7,7 @@ variants as the file lists them, settings of the command line. Tables are merged
 
 from __future__ import annotations
 
+import functools
 import math
 import tomllib
 import typing
@@ -17,24 +18,14 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ftcc.groundside.errors import UserError
+from ftcc.groundside.catalogue import ScenarioError, find, forms_and_variants, parsed, read, shipped, text_of
 from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet, fields_of
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
 
-_HERE = Path(__file__).parent
 _VARIANT_KEYS = ("title", "forms", "claims_of")
 
 M = TypeVar("M", bound=BaseModel)
-
-
-class ScenarioError(UserError):
-    """A scenario that cannot fly: every problem with file, field, value and what is allowed."""
-
-    def __init__(self, file: str | Path, problems: Sequence[str]) -> None:
-        self.file = str(file)
-        self.problems = tuple(problems)
-        super().__init__("\n".join(f"{self.file}: {problem}" for problem in problems))
 
 
 @dataclass(frozen=True)
@@ -58,44 +49,12 @@ class Scenario:
         return "+".join((self.form, *self.variants))
 
 
-def shipped(kind: str = "scenarios") -> dict[str, Path]:
-    """Name and file of the scenarios (or "airframes") that come with the program."""
-    return {path.stem: path for path in sorted((_HERE / kind).glob("*.toml"))}
+_parsed = functools.lru_cache(maxsize=16)(parsed)
 
 
-def find(name_or_path: str | Path) -> Path:
-    """The file of a shipped scenario, of a path, or of a run's folder."""
-    path = Path(name_or_path)
-    if str(name_or_path) in shipped():
-        return shipped()[str(name_or_path)]
-    if path.is_dir() and (path / "scenario.toml").is_file():
-        return path / "scenario.toml"
-    if path.is_file():
-        return path
-    names = ", ".join(shipped())
-    if path.suffix == ".toml" or len(path.parts) > 1:
-        raise ScenarioError(path, [f"there is no such file; shipped scenarios are {names}"])
-    raise ScenarioError(path, [f"there is no such scenario; there are {names}, or give the path of a TOML file"])
-
-
-def read(path: Path) -> dict[str, Any]:
-    """The contents of a TOML file."""
-    try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(path, [f"not a TOML file: {error}"]) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(path, [f"cannot be read: {error}"]) from None
-
-
-def forms_and_variants(document: dict[str, Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
-    """Names of the forms, and the variants by name, of a document."""
-    flown = document.get("flown")
-    if isinstance(flown, dict):
-        return [str(flown.get("form", "flight"))], {}
-    forms = document.get("form", {})
-    variants = document.get("variant", {})
-    return list(forms if isinstance(forms, dict) else ()) or ["flight"], variants if isinstance(variants, dict) else {}
+def _contents(path: Path) -> dict[str, Any]:
+    """The contents of a file, parsed once for all the cases that are made from them: nobody changes them."""
+    return _parsed(path, text_of(path))
 
 
 def load(
@@ -126,7 +85,7 @@ def load(
     ScenarioError
     """
     path = find(name_or_path)
-    document = read(path)
+    document = _contents(path)
     _require_tables(path, document)
     known_forms, known_variants = forms_and_variants(document)
     flown = "flown" in document
@@ -181,7 +140,7 @@ def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet | Poi
                 f"there are {', '.join(sheets)}, or give a TOML file"
             ],
         )
-    document = read(path)
+    document = _contents(path)
     if "kd" in document:
         return validate(PointMassSheet, document, path)
     return validate(AirframeSheet, document, path)

@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ftcc.link.mavlink import LOOPBACK
-
 __all__ = ["PortBlock", "PortError", "UavPorts", "reserve", "runtime_folder"]
 
 _FIRST, _END = 20000, 32768
@@ -84,6 +82,8 @@ def runtime_folder() -> Path:
 
 def _in_use(base: int, size: int) -> int | None:
     """A port of the block that somebody has bound, beside the guard's own."""
+    from ftcc.link.mavlink import LOOPBACK  # who only lists running swarms needs no MAVLink
+
     for port in range(base, base + size):
         for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
             if (port, kind) == (base, socket.SOCK_STREAM):
@@ -99,6 +99,8 @@ def _in_use(base: int, size: int) -> int | None:
 
 
 def _guard(base: int) -> socket.socket | None:
+    from ftcc.link.mavlink import LOOPBACK
+
     guard = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     guard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

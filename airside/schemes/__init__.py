@@ -5,11 +5,14 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import pkgutil
+from typing import TYPE_CHECKING
 
-from ftcc.airside.scheme import Scheme, load
-from ftcc.link.compiled import SCHEME_ENTRY_POINTS
+from ftcc.link.cache import SCHEME_ENTRY_POINTS, kept
 
-__all__ = ["find", "names"]
+if TYPE_CHECKING:
+    from ftcc.airside.scheme import Scheme
+
+__all__ = ["find", "names", "summary"]
 
 
 @functools.cache
@@ -35,6 +38,30 @@ def find(name: str) -> Scheme:
     SchemeError
         With what its file lacks.
     """
+    from ftcc.airside.scheme import load
+
     if name not in _modules():
         raise LookupError(f"there is no scheme {name!r}; there are {', '.join(names())}")
     return load(name, _modules()[name])
+
+
+def summary(name: str) -> tuple[str, list[str]]:
+    """Title and forms of a scheme, for a list; of a file that is no scheme what it lacks, and no forms.
+
+    Those of this folder are imported, which loads numba, only once after an edit.
+    """
+    title, forms = (_kept_summary if _modules()[name].startswith(f"{__name__}.") else _summary)(name)
+    return title, forms
+
+
+def _summary(name: str) -> tuple[str, list[str]]:
+    from ftcc.airside.scheme import SchemeError
+
+    try:
+        scheme = find(name)
+    except SchemeError as error:
+        return str(error), []
+    return scheme.title, list(scheme.forms)
+
+
+_kept_summary = kept(_summary)

@@ -6,7 +6,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from ftcc.groundside.cli import airframe, fly, ground, results, scenarios, study, view
 from ftcc.groundside.cli.common import fail, warn
@@ -48,7 +48,21 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
 }
 
 
-class _Sections(TyperGroup):
+class _LightHelp:
+    """A command whose ``--help`` is a plain flag: typer would load pydantic to find that it was not given."""
+
+    def get_help_option(self, ctx: Any) -> Any:
+        option = super().get_help_option(ctx)  # type: ignore[misc]
+        if option is not None:
+            option.default = False
+        return option
+
+
+class _Command(_LightHelp, TyperCommand):
+    """A command of ours."""
+
+
+class _Sections(_LightHelp, TyperGroup):
     """Help that lists the commands by section."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -77,7 +91,7 @@ for _title, _commands in _SECTIONS.items():
         if isinstance(_command, typer.Typer):
             app.add_typer(_command, rich_help_panel=_title)
         else:
-            app.command(_command.__name__.removesuffix("_all"), rich_help_panel=_title)(_command)
+            app.command(_command.__name__.removesuffix("_all"), cls=_Command, rich_help_panel=_title)(_command)
 
 
 def main() -> None:
