@@ -10,6 +10,7 @@ all leaders) and ``hull_distance_x`` (how far ahead of or behind them).
 from __future__ import annotations
 
 import ast
+import functools
 import math
 import operator
 from collections.abc import Callable, Iterable
@@ -110,6 +111,7 @@ _SWARM_FUNCTIONS: dict[str, Callable[[Array, int, Graph], Array]] = {
 """Of the values of all followers (followers, n), seen by the i-th."""
 
 
+@functools.cache
 def _parsed(expression: str) -> ast.expr:
     try:
         return ast.parse(expression.strip(), mode="eval").body
@@ -117,7 +119,8 @@ def _parsed(expression: str) -> ast.expr:
         raise ValueError(f"{expression!r} is no expression: {error.msg}") from None
 
 
-def names_in(expression: str) -> set[str]:
+@functools.cache
+def names_in(expression: str) -> frozenset[str]:
     """The column names that an expression uses.
 
     Raises
@@ -147,7 +150,7 @@ def names_in(expression: str) -> set[str]:
             _other(expression, node)
         elif not isinstance(node, (ast.operator, ast.unaryop, ast.expr_context)):
             raise ValueError(f"{expression!r}: only arithmetic over columns is allowed")
-    return {name for key, name in names if key not in called}
+    return frozenset(name for key, name in names if key not in called)
 
 
 def _other(expression: str, node: ast.Subscript) -> tuple[str, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import math
 import platform
@@ -383,10 +384,13 @@ _VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "
 """What the numbers of a flight may depend on."""
 
 
+@functools.cache
+def _versions() -> dict[str, str]:
+    return {name: importlib.metadata.version(name) for name in _VERSIONED} | {"python": platform.python_version()}
+
+
 def _as_flown(scenario: Scenario, scheme: Scheme) -> str:
     """The merged scenario with seed, versions, and every gain by value: a later default must not change it."""
-    versions = {name: importlib.metadata.version(name) for name in _VERSIONED}
-    versions["python"] = platform.python_version()
     document = {key: value for key, value in scenario.document.items() if key != "flown"}
     document["seed"] = scenario.plan.seed
     gains = document.get("gains", {})
@@ -396,6 +400,6 @@ def _as_flown(scenario: Scenario, scheme: Scheme) -> str:
         "form": scenario.form,
         "variants": list(scenario.variants),
         "settings": list(scenario.settings),
-        "versions": versions,
+        "versions": _versions(),
     }
     return tomli_w.dumps(document)

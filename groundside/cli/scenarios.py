@@ -30,8 +30,7 @@ def list_all() -> None:
     from rich.table import Table
 
     from ftcc.airside import schemes
-    from ftcc.airside.scheme import SchemeError
-    from ftcc.groundside.scenario import forms_and_variants, read, shipped
+    from ftcc.groundside.catalogue import shipped, summary
 
     def table(*headings: str) -> Table:
         made = Table(header_style="bold", box=None, pad_edge=False)
@@ -41,18 +40,12 @@ def list_all() -> None:
 
     laws = table("scheme", "what it is", "forms")
     for name in schemes.names():
-        try:
-            scheme = schemes.find(name)
-        except SchemeError as error:
-            laws.add_row(name, str(error), "-")
-        else:
-            laws.add_row(name, scheme.title, ", ".join(scheme.forms))
+        title, forms = schemes.summary(name)
+        laws.add_row(name, title, ", ".join(forms) or "-")
     scenarios = table("scenario", "what it flies", "s", "forms", "variants")
     for name, path in shipped().items():
-        document = read(path)
-        forms, variants = forms_and_variants(document)
-        length = f"{document.get('duration', 0.0):g}"
-        scenarios.add_row(name, document.get("title", ""), length, ", ".join(forms), ", ".join(variants))
+        told = summary(path)
+        scenarios.add_row(name, told.title, f"{told.duration:g}", ", ".join(told.forms), ", ".join(told.variants))
     out = terminal()
     out.print(laws)
     out.print()
@@ -100,7 +93,8 @@ def simulate(
     """Fly a scenario in one process, as fast as this machine can, and record it."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from ftcc.groundside.simulate import simulate as fly_and_record
+    from ftcc.groundside.claims import evaluate
+    from ftcc.groundside.simulate import fly, record
 
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     folder = new_run_folder(mission, out)
@@ -108,16 +102,18 @@ def simulate(
     with Progress(*columns, console=terminal(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing (the first start compiles for half a minute)", total=None)
         flying = f"simulating {mission.name} {mission.case}"
-        run = fly_and_record(
+        flight = fly(
             mission,
-            folder,
             lambda t: progress.update(task, completed=t),
             lambda: progress.update(task, description=flying, total=mission.timing.duration),
         )
-    show_summary(folder)
+        run = record(flight, folder)
+    # What was recorded is in memory still.
+    show_summary(folder, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration))
     for uav, text in run.lost.items():
         warn(f"UAV {uav}: {text}")
-    interrupted = run.end < mission.timing.duration - mission.timing.period * mission.timing.record_every
+    end = float(flight.t[-1]) if len(flight.t) else 0.0
+    interrupted = end < mission.timing.duration - mission.timing.period * mission.timing.record_every
     if run.lost or interrupted:
         raise typer.Exit(1)
 
