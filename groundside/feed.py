@@ -9,7 +9,7 @@ import contextlib
 import json
 import socket
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,8 @@ def feed_path(name: str) -> Path:
 
 def encoded(snapshot: Snapshot) -> bytes:
     """A snapshot as a line."""
-    return json.dumps(asdict(snapshot), separators=(",", ":")).encode() + b"\n"
+    # Its dataclasses are told by their fields, without the copies that `asdict` makes of everything in them.
+    return json.dumps(snapshot, default=vars, separators=(",", ":")).encode() + b"\n"
 
 
 def decoded(line: bytes) -> Snapshot:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+import operator
 import struct
 import time
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from ftcc.airside.ground import LINK_FIELDS
 from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
-from ftcc.link.mavlink import STATION, Endpoint
+from ftcc.groundside.telemetry import ARRAY, HEARTBEAT, Ear, Told
 from ftcc.link.modes import NAMES as MODES
 from ftcc.link.modes import mode_of
 from ftcc.sim.plant import TRUTH
@@ -22,18 +23,19 @@ from ftcc.sim.process import truth_array
 
 __all__ = ["Monitor"]
 
+_STAMP = struct.Struct(">Q")
+"""What a .tlog has before each message: when it came, us."""
 
-@dataclass
+
+@dataclass(slots=True)
 class _Heard:
-    """Latest telemetry of one UAV."""
+    """Latest telemetry of one UAV, as numbers: names are given to them when a snapshot is wanted."""
 
     t: float = 0.0
-    truth: dict[str, float] = field(default_factory=dict)
-    signals: dict[str, float] = field(default_factory=dict)
-    links: dict[int, LinkState] = field(default_factory=dict)
+    truth: tuple[float, ...] = ()
+    signals: tuple[float, ...] = ()
+    links: tuple[float, ...] = ()
     mode: str = ""
-    heartbeat: float = -math.inf
-    """Wall time of the last HEARTBEAT (monotonic, s)."""
 
 
 class Monitor:
@@ -52,13 +54,10 @@ class Monitor:
         log: Path | None = None,
         id_offset: int = 0,
     ) -> None:
-        self._endpoint = Endpoint(STATION, 1, port, only=sources)
-        self._endpoint.enlarge_buffer()
+        self._ear = Ear(port, sources)
         self._uavs = {uav: _Heard() for uav in uavs}
-        self._id_offset = id_offset
-        self._signals = signals
-        self._truth = truth_array(plant)
-        self._plant = find(plant)
+        self._of_system = {uav + id_offset: heard for uav, heard in self._uavs.items()}
+        self._read_state = _state_reader(find(plant), truth_array(plant), signals)
         self._log = log.open("ab") if log else None
         self._events: list[Event] = []
         self.t = 0.0
@@ -66,48 +65,45 @@ class Monitor:
 
     def fileno(self) -> int:
         """For ``select``."""
-        return self._endpoint.fileno()
+        return self._ear.fileno()
 
     def close(self) -> None:
         """Free the port, finish the log."""
-        self._endpoint.close()
+        self._ear.close()
         if self._log:
             self._log.close()
             self._log = None
 
     def read(self) -> None:
         """Take in all telemetry that has arrived."""
-        for message in self._endpoint.receive():
-            self._write(message)
-            heard = self._uavs.get(message.get_srcSystem() - self._id_offset)
-            if heard is not None:
-                self._take(heard, message)
+        for told in self._ear.hear():
+            if self._log and told:
+                stamp = _STAMP.pack(time.time_ns() // 1000)
+                self._log.write(b"".join([part for one in told for part in (stamp, one.frame)]))
+            for one in told:
+                heard = self._of_system.get(one.system)
+                if heard is not None:
+                    self._take(heard, one)
 
-    def _write(self, message: Any) -> None:
-        if self._log:
-            self._log.write(struct.pack(">Q", int(time.time() * 1e6)) + bytes(message.get_msgbuf()))
-
-    def _take(self, heard: _Heard, message: Any) -> None:
-        kind = message.get_type()
-        if kind == "DEBUG_FLOAT_ARRAY":
-            name = message.name.rstrip("\0")
-            if name == "truth":
-                heard.t = message.time_usec / 1e6
+    def _take(self, heard: _Heard, told: Told) -> None:
+        if told.kind == ARRAY:
+            if told.name == "truth":
+                heard.t = told.stamp_us / 1e6
                 self.t = max(self.t, heard.t)
-                heard.truth = dict(zip(self._truth, message.data, strict=False))
-            elif name == "signals":
-                heard.signals = dict(zip(self._signals, message.data, strict=False))
-            elif name == "links":
-                heard.links = _links(message.data)
-        elif kind == "HEARTBEAT":
-            heard.heartbeat = time.monotonic()
-            mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
+                heard.truth = told.values
+            elif told.name == "signals":
+                heard.signals = told.values
+            elif told.name == "links":
+                heard.links = told.values
+        elif told.kind == HEARTBEAT:
+            custom = int(told.values[0])
+            mode = mode_of(custom >> 16 & 0xFF, custom >> 24)
             heard.mode = MODES.get(mode, "") if mode is not None else ""
 
     @property
     def strangers(self) -> int:
         """Datagrams that came from elsewhere."""
-        return self._endpoint.strangers
+        return self._ear.strangers
 
     @property
     def complete(self) -> bool:
@@ -120,34 +116,52 @@ class Monitor:
 
     def snapshot(self) -> Snapshot:
         """The swarm as heard so far, and what happened since the last call."""
-        uavs = {uav: _state(heard, self._plant) for uav, heard in self._uavs.items() if heard.truth}
+        uavs = {uav: self._read_state(heard) for uav, heard in self._uavs.items() if heard.truth}
         events, self._events = tuple(self._events), []
         return Snapshot(self.t, uavs, events)
 
 
-def _state(heard: _Heard, plant: ModuleType) -> UavState:
-    truth = heard.truth
-    actuators = plant.ACTUATORS
-    return UavState(
-        t=heard.t,
-        truth={name: truth[name] for name in TRUTH},
-        command={name: truth[f"{name}_command"] for name in actuators},
-        acting={name: truth[name] for name in actuators},
-        effectiveness={name: truth[f"{name}_effectiveness"] for name in actuators},
-        bias={name: truth[f"{name}_bias"] for name in actuators},
-        disturbances={name: truth[name] for name, _ in plant.DISTURBANCES},
-        signals=heard.signals,
-        links=heard.links,
-        mode=heard.mode,
-        late=int(truth["late"]),
-    )
+def _state_reader(plant: ModuleType, told: Sequence[str], signals: Sequence[str]) -> Callable[[_Heard], UavState]:
+    """What makes a `UavState` of what was heard: by the names of the plant's array "truth" and of the signals."""
+    place = {name: i for i, name in enumerate(told)}
+    names = {
+        "truth": {name: place[name] for name in TRUTH},
+        "command": {name: place[f"{name}_command"] for name in plant.ACTUATORS},
+        "acting": {name: place[name] for name in plant.ACTUATORS},
+        "effectiveness": {name: place[f"{name}_effectiveness"] for name in plant.ACTUATORS},
+        "bias": {name: place[f"{name}_bias"] for name in plant.ACTUATORS},
+        "disturbances": {name: place[name] for name, _ in plant.DISTURBANCES},
+    }
+    groups = [(group, tuple(places), _picker(list(places.values()))) for group, places in names.items()]
+    late = place["late"]
+
+    def read(heard: _Heard) -> UavState:
+        truth = heard.truth
+        by_name: dict[str, Any] = {group: dict(zip(keys, pick(truth), strict=True)) for group, keys, pick in groups}
+        return UavState(
+            t=heard.t,
+            signals=dict(zip(signals, heard.signals, strict=False)),
+            links=_links(heard.links),
+            mode=heard.mode,
+            late=int(truth[late]),
+            **by_name,
+        )
+
+    return read
+
+
+def _picker(places: list[int]) -> Callable[[Sequence[float]], tuple[float, ...]]:
+    """What takes the numbers at ``places``, as a tuple however many they are."""
+    if len(places) > 1:
+        return operator.itemgetter(*places)
+    return lambda values: tuple(values[place] for place in places)
 
 
 def _links(data: Sequence[float]) -> dict[int, LinkState]:
     size = len(LINK_FIELDS)
     found = {}
     for start in range(0, len(data) - size + 1, size):
-        sender, age, received, lost, cut = data[start : start + size]
-        if sender > 0:
+        if data[start] > 0:
+            sender, age, received, lost, cut = data[start : start + size]
             found[int(sender)] = LinkState(age if age >= 0 else math.inf, int(received), int(lost), bool(cut))
     return found

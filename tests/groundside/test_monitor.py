@@ -1,0 +1,211 @@
+"""The ground station's ear: from the bytes it reads what pymavlink reads, and it refuses what pymavlink refuses."""
+
+from __future__ import annotations
+
+import math
+import random
+import socket
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ftcc.groundside.monitor import Monitor
+from ftcc.groundside.snapshot import LinkState
+from ftcc.groundside.telemetry import ARRAY, HEARTBEAT, Ear, Told
+from ftcc.link.codec import Codec, dialect
+from ftcc.link.mavlink import float_array
+from ftcc.link.modes import MISSION, custom_mode
+from ftcc.link.signing import Signing
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.plants import find
+from ftcc.sim.process import truth_array
+
+PLANT = "longitudinal"
+NAMES = truth_array(PLANT)
+SIGNALS = ("S1", "zhat")
+
+
+@pytest.fixture
+def ear() -> Iterator[Ear]:
+    made = Ear(0, ())
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def pilot() -> Iterator[socket.socket]:
+    """Where telemetry comes from."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind(("127.0.0.1", 0))
+        yield link
+
+
+@pytest.fixture
+def station(pilot: socket.socket, tmp_path: Path) -> Iterator[Monitor]:
+    """Hears UAVs 1 and 2 as systems 101 and 102."""
+    made = Monitor(0, {pilot.getsockname()[1]}, (1, 2), PLANT, SIGNALS, tmp_path / "telemetry.tlog", id_offset=100)
+    pilot.connect(made._ear._socket.getsockname())
+    yield made
+    made.close()
+
+
+def as_pymavlink_reads(datagram: bytes) -> list[Told]:
+    told = []
+    for message in Codec(254, 1).parse(datagram):
+        read = Told(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
+        if read.kind == HEARTBEAT:
+            read = read._replace(values=(message.custom_mode,))
+        if read.kind == ARRAY:
+            read = read._replace(name=message.name, stamp_us=message.time_usec, values=tuple(message.data))
+        told.append(read)
+    return told
+
+
+def some_message(draw: random.Random) -> Any:
+    """One of those that are read from the bytes, or another; now and then with zeros at its end."""
+    stamp = draw.randrange(2**32)
+    floats = [draw.choice((0.0, draw.uniform(-1e3, 1e3), draw.uniform(-3e38, 3e38))) for _ in range(58)]
+    if draw.random() < 0.5:
+        floats = floats[: draw.randrange(59)]
+        floats += [0.0] * (58 - len(floats))
+    name = draw.choice((b"truth", b"signals", b"links", b"", b"tenletters", b"a\0b", b"\xff"))
+    return draw.choice(
+        (
+            dialect.MAVLink_heartbeat_message(1, 12, 129, draw.randrange(2**32), 4, 3),
+            dialect.MAVLink_sys_status_message(1, 1, 1, 0, 65535, -1, 100, draw.randrange(9), 0, 0, 0, 0, 0),
+            dialect.MAVLink_attitude_message(stamp, *floats[:6]),
+            dialect.MAVLink_local_position_ned_message(stamp, *floats[6:12]),
+            dialect.MAVLink_debug_float_array_message(stamp * 1000, name, draw.randrange(9), floats),
+            dialect.MAVLink_statustext_message(4, b"stall"),
+            dialect.MAVLink_vfr_hud_message(*floats[:2], 90, 50, *floats[2:4]),
+        )
+    )
+
+
+def damaged(datagram: bytes, draw: random.Random) -> bytes:
+    """The datagram, or one that is not perfect any more."""
+    octets = bytearray(datagram)
+    at = draw.randrange(len(octets))
+    match draw.randrange(6):
+        case 0:
+            octets[at] = draw.randrange(256)
+        case 1:
+            del octets[at:]
+        case 2:
+            octets[at:at] = draw.randbytes(draw.randrange(1, 20))
+        case 3:
+            octets += draw.randbytes(draw.randrange(1, 20))
+        case _:
+            pass
+    return bytes(octets)
+
+
+def test_whatever_comes_is_read_as_pymavlink_reads_it(ear: Ear) -> None:
+    draw = random.Random(5)
+    codecs = [Codec(system, 1) for system in (1, 7, 200)]
+    for _ in range(3000):
+        messages = [some_message(draw) for _ in range(draw.randrange(1, 5))]
+        datagram = damaged(draw.choice(codecs).pack(*messages), draw)
+        assert ear.read(datagram) == as_pymavlink_reads(datagram)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_value_that_is_not_finite_is_refused_and_its_neighbours_are_taken(ear: Ear, value: float) -> None:
+    datagram = Codec(1, 1).pack(float_array(10, "truth", [1.0, 2.0]), float_array(11, "signals", [3.0]))
+    bad = bytearray(datagram)
+    bad[30:34] = struct.pack("<f", value)  # the first number of the first message
+    end = 10 + bad[1]
+    bad[end : end + 2] = struct.pack("<H", dialect.x25crc(bytes(bad[1:end]) + b"\xe8").crc)
+    assert [told.name for told in ear.read(bytes(bad))] == ["signals"]
+    assert ear.read(bytes(bad)) == as_pymavlink_reads(bytes(bad))
+
+
+def test_signed_and_old_messages_are_read_as_ever(ear: Ear, tmp_path: Path) -> None:
+    message = float_array(10, "truth", [1.0, 2.0])
+    signed = Codec(1, 1, Signing(b"k" * 32, tmp_path / "stamps.json")).pack(message)
+    first = bytes(dialect.MAVLink_heartbeat_message(1, 12, 129, 7, 4, 3).pack(dialect.MAVLink(None, 3, 1), True))
+    for datagram in (signed, first, first + signed):
+        assert len(ear.read(datagram)) >= 1
+        assert ear.read(datagram) == as_pymavlink_reads(datagram)
+
+
+def test_what_comes_again_and_again_does_not_need_pymavlink(ear: Ear, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ear._codec, "parse", lambda _: pytest.fail("parsed"))
+    state = [0.1] * 6
+    datagram = Codec(5, 1).pack(
+        dialect.MAVLink_attitude_message(1, *state),
+        dialect.MAVLink_local_position_ned_message(1, *state),
+        float_array(1000, "signals", [0.5] * 30),
+        float_array(1000, "links", [2.0, 0.05, 7.0, 1.0, 0.0]),
+        dialect.MAVLink_sys_status_message(1, 1, 1, 0, 65535, -1, 100, 0, 0, 0, 0, 0, 0),
+        dialect.MAVLink_heartbeat_message(1, 12, 129, custom_mode(MISSION), 4, 3),
+    )
+    assert [told.system for told in ear.read(datagram)] == [5] * 6
+
+
+def test_the_swarm_as_it_was_told(station: Monitor, pilot: socket.socket) -> None:
+    true = {name: float(i) for i, name in enumerate(NAMES)}
+    pilot.send(Codec(101, 25).pack(float_array(2_500_000, "truth", list(true.values()))))
+    assert not station.complete
+    pilot.send(Codec(102, 25).pack(float_array(2_400_000, "truth", list(true.values()))))
+    links = [2.0, 0.05, 7.0, 1.0, 0.0, 3.0, -1.0, 0.0, 0.0, 1.0]
+    pilot.send(
+        Codec(101, 1).pack(
+            float_array(2_500_000, "signals", [0.5, 990.0]),
+            float_array(2_500_000, "links", links),
+            dialect.MAVLink_heartbeat_message(1, 12, 129, custom_mode(MISSION), 4, 3),
+            dialect.MAVLink_statustext_message(4, b"not kept"),
+        )
+    )
+    station.read()
+    assert station.complete
+    assert station.t == 2.5
+    heard = station.snapshot().uavs
+    plant = find(PLANT)
+    assert heard[2].t == 2.4
+    assert heard[2].signals == {}
+    assert heard[2].links == {}
+    one = heard[1]
+    assert dict(one.truth) == {name: true[name] for name in TRUTH}
+    assert dict(one.command) == {name: true[f"{name}_command"] for name in plant.ACTUATORS}
+    assert dict(one.acting) == {name: true[name] for name in plant.ACTUATORS}
+    assert dict(one.effectiveness) == {name: true[f"{name}_effectiveness"] for name in plant.ACTUATORS}
+    assert dict(one.bias) == {name: true[f"{name}_bias"] for name in plant.ACTUATORS}
+    assert dict(one.disturbances) == {name: true[name] for name, _ in plant.DISTURBANCES}
+    assert one.late == int(true["late"])
+    assert one.signals == {"S1": 0.5, "zhat": 990.0}
+    age = struct.unpack("<f", struct.pack("<f", 0.05))[0]
+    assert one.links == {2: LinkState(age, 7, 1, False), 3: LinkState(math.inf, 0, 0, True)}
+    assert one.mode == "mission"
+
+
+def test_the_log_holds_the_messages_as_they_came(station: Monitor, pilot: socket.socket, tmp_path: Path) -> None:
+    draw = random.Random(6)
+    sent = [Codec(101, 1).pack(some_message(draw), some_message(draw)) for _ in range(50)]
+    for datagram in sent:
+        pilot.send(datagram)
+        pilot.send(b"\xfd" + datagram[:7])
+    station.read()
+    station.close()
+    logged = (tmp_path / "telemetry.tlog").read_bytes()
+    frames = b""
+    while logged:
+        (stamp,), length = struct.unpack(">Q", logged[:8]), 12 + logged[9]
+        assert stamp > 1.7e15
+        frames, logged = frames + logged[8 : 8 + length], logged[8 + length :]
+    assert frames == b"".join(sent)
+
+
+def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.sendto(
+            Codec(101, 25).pack(float_array(9, "truth", [1.0] * len(NAMES))), station._ear._socket.getsockname()
+        )
+        station.read()
+    assert station.strangers == 1
+    assert station.snapshot().uavs == {}
+    station.close()
+    assert (tmp_path / "telemetry.tlog").read_bytes() == b""
