@@ -3,9 +3,16 @@
 No socket, no thread, no Zenoh, Rerun or pyarrow here.
 """
 
+# ruff: noqa: E402 (the collector rests before anything is imported)
+
 from __future__ import annotations
 
+import gc
 import os
+
+# What is loaded here stays: a garbage collection finds nothing in it, and in a child it would touch, and so copy, all
+# pages that are shared. A quarter of the time that loading takes is saved, too.
+gc.disable()
 
 from ftcc.airside import process as autopilot_process
 from ftcc.airside.autopilots import placeholder as no_autopilot
@@ -39,3 +46,6 @@ def load(scheme: str, plant: str) -> None:
 
 if SCHEME_VARIABLE in os.environ:
     load(os.environ[SCHEME_VARIABLE], os.environ[PLANT_VARIABLE])
+
+gc.freeze()
+gc.enable()
