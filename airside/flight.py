@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ftcc.airside.autopilots import aim
+from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, WRITE
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import report_link
@@ -164,12 +165,20 @@ def report(group, timing, i, now_us):
 
 @compiled
 def something_to_do(group, now_us):
-    """Whether Python has something to do after this tick."""
-    if group.transmission.used[0] > 0 or group.autopilots.happenings.used[0] > 0 or now_us >= group.report_us[0]:
-        return True
+    """Whether Python has something to do after this tick; what, says ``to_do``."""
+    to_do = 0
+    if group.transmission.used[0] > 0:
+        to_do |= PUBLISH
+    if is_full(group.rows) or is_full(group.link_rows):
+        to_do |= WRITE
+    if group.autopilots.happenings.used[0] > 0:
+        to_do |= NOTE
     if group.given_up[0] > 0 or group.unsendable[0] > 0:
-        return True
-    return is_full(group.rows) or is_full(group.link_rows)
+        to_do |= GIVE_UP
+    if now_us >= group.report_us[0] and monotonic(group.room) >= group.report_wall[0]:
+        to_do |= REPORT
+    group.to_do[0] = to_do
+    return to_do > 0
 
 
 # Waiting for what a tick needs.
@@ -274,6 +283,16 @@ def _next_state(group):
 
 
 @compiled
+def is_over(group, timing):
+    """Whether all who are alive have flown their last tick."""
+    flying = 0
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.done[i] < timing.ticks:
+            flying += 1
+    return flying == 0
+
+
+@compiled
 def _fly_tick(group, timing, n):
     """Fly tick ``n`` of those whose state of it is here; whether Python has something to do then."""
     for i in range(group.alive.shape[0]):
@@ -286,7 +305,7 @@ def _fly_tick(group, timing, n):
 def fly_in_lockstep(group, timing):
     """Fly tick after tick, all at once, until Python has something to do; why, see `link.waiting`."""
     while True:
-        if not group.alive.any():
+        if is_over(group, timing):
             return FLOWN
         if monotonic(group.room) >= group.attention[0]:
             return ATTEND
@@ -307,7 +326,7 @@ def fly_in_lockstep(group, timing):
 def fly_freely(group, timing):
     """Work on the states of each vehicle as they come, with the newest records, until Python has something to do."""
     while True:
-        if not group.alive.any():
+        if is_over(group, timing):
             return FLOWN
         if monotonic(group.room) >= group.attention[0]:
             return ATTEND

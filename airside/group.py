@@ -22,7 +22,7 @@ from ftcc.link.recording import Rows
 from ftcc.link.timing import Timing
 from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, STATE, Wire, new_wire
 
-__all__ = ["AutopilotGroup", "build_group", "flight_of"]
+__all__ = ["GIVE_UP", "NOTE", "PUBLISH", "REPORT", "WRITE", "AutopilotGroup", "build_group", "flight_of"]
 
 
 @functools.cache
@@ -33,6 +33,9 @@ def flight_of(scheme: str) -> ModuleType:
     if stages.REFUSAL:
         uncompile([flight])
     return flight
+
+PUBLISH, WRITE, NOTE, GIVE_UP, REPORT = 1, 2, 4, 8, 16
+"""What there may be to do after a tick: a transmission for the mesh, full rows, events, a UAV that ends, telemetry."""
 
 
 class AutopilotGroup(NamedTuple):
@@ -85,8 +88,12 @@ class AutopilotGroup(NamedTuple):
     """(1,): lockstep: those who hear this process have its transmissions up to this number."""
     mail: NDArray[np.int64]
     """(1,): 1 where the mesh has brought something."""
+    to_do: NDArray[np.int64]
+    """(1,): what Python has to do after a tick: `PUBLISH`, `WRITE`, ... added up."""
     report_us: NDArray[np.int64]
-    """(1,): simulated time from which on something is to be told to the ground."""
+    """(1,): simulated time from which on something is to be told to the ground,"""
+    report_wall: NDArray[np.float64]
+    """(1,): and wall time, s (monotonic): both must have come."""
     attention: NDArray[np.float64]
     """(1,): wall time from which on Python wants to look around, s (monotonic)."""
     since: NDArray[np.float64]
@@ -135,7 +142,9 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
         complete=np.full(1, -1, np.int64),
         acknowledged=np.full(1, -1, np.int64),
         mail=np.zeros(1, np.int64),
+        to_do=np.zeros(1, np.int64),
         report_us=np.zeros(1, np.int64),
+        report_wall=np.zeros(1),
         attention=np.zeros(1),
         since=np.zeros(1),
         room=np.zeros(2, np.int64),

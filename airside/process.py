@@ -1,6 +1,6 @@
 """The autopilot process: one or several autopilots of a swarm, each a tick per state that its vehicle sends.
 
-A tick, from the datagram of a state to that of the command that answers it, is compiled code: `flight` lists its stages.
+A tick, from the datagram of a state to that of the command that answers it, is compiled: `flight` lists its stages.
 Here is what happens beside the ticks: transmissions over the mesh, the recording, the ground, the launcher. In lockstep
 an autopilot waits for every record that could be usable at its tick and never runs ahead of those who hear it; on the
 wall clock it works on every state that arrives and on the newest records it has.
@@ -15,7 +15,7 @@ from types import ModuleType
 
 from ftcc.airside.autopilots import tick_of, told
 from ftcc.airside.ground import GroundLink, Seat
-from ftcc.airside.group import AutopilotGroup, build_group, flight_of
+from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, WRITE, AutopilotGroup, build_group, flight_of
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
@@ -139,33 +139,27 @@ class Crew:
                 self.work()
             else:
                 self.attend()
-            if self.gate.stopping or self.over:
+            if self.gate.stopping:
                 break
             cause = fly(self.group, self.timing)
         self.end()
-
-    @property
-    def over(self) -> bool:
-        """Whether all who are alive have flown their last tick."""
-        return bool((self.group.done[self.group.alive == 1] >= self.timing.ticks).all())
 
     # What is to be done after a tick.
 
     def work(self) -> None:
         """Put a transmission on the mesh, write rows, tell what happened and what the ground wants to hear."""
-        group = self.group
-        if group.unsendable[0]:
-            raise ValueError(f"UAV {self.names}: a value that was to be sent is not finite")
-        if group.transmission.used[0]:
+        to_do = int(self.group.to_do[0])
+        if to_do & PUBLISH:
             self.neighbourhood.publish()
-        if group.given_up[0]:
+        if to_do & GIVE_UP:
             self.give_up()
-        self.recorder.write_if_full()
-        self.link_recorder.write_if_full()
-        if group.autopilots.happenings.used[0]:
-            for at_us, uav, severity, text in told(group.autopilots, self.specs):
+        if to_do & WRITE:
+            self.recorder.write()
+            self.link_recorder.write()
+        if to_do & NOTE:
+            for at_us, uav, severity, text in told(self.group.autopilots, self.specs):
                 self.gate.tell(Said(severity, text, uav, at_us))
-        if group.alive.any():
+        if to_do & REPORT:
             self.report()
 
     def report(self) -> None:
@@ -174,10 +168,18 @@ class Crew:
         for i, link in enumerate(self.ground):
             if group.active[i]:
                 link.report(int(group.done[i]) * self.timing.period_us)
-        group.report_us[0] = min(link.next_us for link in self.ground if link.seat.alive)
+        flying = [link for link in self.ground if link.seat.alive]
+        group.report_us[0] = min(link.next_us for link in flying)
+        group.report_wall[0] = min(link.next_wall for link in flying)
+
+    def report_soon(self) -> None:
+        """Look after the next tick what is due."""
+        self.group.report_us[0], self.group.report_wall[0] = 0, 0.0
 
     def give_up(self) -> None:
         """The law of some UAVs gave no finite command: tell their vehicles, and end them."""
+        if self.group.unsendable[0]:
+            raise ValueError(f"UAV {self.names}: a value that was to be sent is not finite")
         self.group.given_up[0] = 0
         for i, link in enumerate(self.ground):
             if not self.group.alive[i] and link.seat.alive:
@@ -191,7 +193,7 @@ class Crew:
         """What the launcher says and the ground asks, whether the swarm flies or is held."""
         if self.waiter.wait(0.0):
             # What was asked may have changed what is due when; who has died is not waited for.
-            self.group.report_us[0] = 0
+            self.report_soon()
             self.neighbourhood.take()
         now = time.monotonic()
         if now >= self.group.attention[0]:
@@ -204,15 +206,14 @@ class Crew:
 
     def complain(self) -> None:
         """Say for what this process waits, where it has waited for long."""
-        progress = int(self.group.done.sum())
-        if progress != self.progress or not self.setting.lockstep:
+        progress, tick = int(self.group.done.sum()), int(self.group.done.max()) + 1
+        if progress != self.progress or not self.setting.lockstep or not self.gate.open(tick):
             self.progress = progress
             self.stall.progress()
         elif self.stall.long:
             pending = zip(self.specs, self.group.pending, strict=True)
             missing = [f"the state of UAV {spec.uav}" for spec, tick in pending if tick < 0]
             waits_for = ", ".join(missing) or self.neighbourhood.missing()
-            tick = int(self.group.done.max()) + 1
             self.gate.tell(Said("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {waits_for}"))
 
     progress = -1
@@ -231,7 +232,7 @@ class Crew:
                 self.ground[i].end()
             elif message.get_type() == "COMMAND_ACK":
                 self.ground[i].failures.vehicle_answered(message)
-                self.group.report_us[0] = 0
+                self.report_soon()
 
     @property
     def names(self) -> str:

@@ -178,6 +178,10 @@ class Gate:
         pace, self._new_pace = self._new_pace, None
         return pace
 
+    def open(self, tick: int) -> bool:
+        """Whether the swarm may pass this tick."""
+        return self.limit is None or tick <= self.limit
+
     def hold(self, tick: int) -> None:
         """Say, once, that the limit holds this process before a tick."""
         if self._held != tick:

@@ -91,8 +91,9 @@ class Mesh:
             arrived.append(bytes(sample.payload))
             self.mail[0] = 1
             if not self._rung:
-                self._rung = True
+                # In this order: where it says that the bell was rung, there is something to read.
                 os.write(self._button, b".")
+                self._rung = True
 
         return keep
 
@@ -121,7 +122,7 @@ class Mesh:
     def receive(self) -> list[tuple[int, bytes]]:
         """The transmissions that have arrived since the last call, with their senders; those of one in order."""
         if self._rung:
-            # In this order: what arrives meanwhile rings again.
+            # In this order: what arrives after this rings again.
             os.read(self._bell, 1)
             self._rung = False
         self.mail[0] = 0

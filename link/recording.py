@@ -173,16 +173,10 @@ class Recorder:
             part.write(self.rows.values[i, : self.rows.filled[i]])
         self.rows.filled[:] = 0
 
-    def write_if_full(self) -> None:
-        """Write where a UAV has filled its rows."""
-        if is_full(self.rows):
-            self.write()
-
     def write_if_due(self) -> None:
-        """Write where rows have waited for a second of wall time, too."""
-        if time.monotonic() - self._written > _FLUSH:
+        """Write where rows have waited for a second of wall time, or where a UAV has filled its rows."""
+        if time.monotonic() - self._written > _FLUSH or self.rows.filled.max() >= ROWS:
             self.write()
-        self.write_if_full()
 
     def close(self) -> None:
         """Write the rest and end the files."""

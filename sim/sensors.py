@@ -11,10 +11,7 @@ from ftcc.link.philox import NOISE, gaussian_pair, philox
 from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, P, Q, R, V, X, Y, Z
 
-__all__ = ["STATE_MESSAGE", "add_noise", "encode_state"]
-
-STATE_MESSAGE = ("q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed", "x", "y", "z", "vx", "vy", "vz")
-"""The float32 fields of ATTITUDE_QUATERNION and LOCAL_POSITION_NED, in this order."""
+__all__ = ["add_noise", "encode_state"]
 
 _CHANNELS = len(TRUTH)
 
@@ -42,7 +39,7 @@ def add_noise(true, deviation, seed, uav, tick, out):
 
 @compiled
 def encode_state(measured, out):
-    """Turn ``measured`` (order of `TRUTH`) into the fields of `STATE_MESSAGE`, rounded to float32 as on the wire.
+    """Turn ``measured`` (order of `TRUTH`) into the fields of ``wire.STATE``, rounded to float32 as on the wire.
 
     Attitude as `body_attitude` has it; north-east-down.
     """

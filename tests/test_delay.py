@@ -11,13 +11,14 @@ import pytest
 
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.link.gate import Ended, Gate, Go, Limit, Pace, Release
-from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, STATION, Endpoint, command_message, read_state
+from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, STATION, Endpoint
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.process import Vehicles
 from ftcc.sim.spec import build
+from tests.pymavlink_wire import command_message, read_state
 from tests.swarm import TRIM, Swarm, timing, vehicle
 
 START = {1: (29.5, 0.0, 1000.5, 0.01, 0.05, 0.02), 4: (30.5, 0.0, 999.7, 0.0, 0.02, 0.0)}

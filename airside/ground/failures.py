@@ -112,6 +112,11 @@ class Failures:
             self._link.answer(request, Answer(_FAILED, "the vehicle does not answer"))
 
     @property
+    def armed(self) -> bool:
+        """Whether something has been armed that does not act yet."""
+        return bool(self._armed)
+
+    @property
     def next_us(self) -> int:
         """When the next of what has been armed acts, simulated us."""
         return self._armed[0][0] if self._armed else _NEVER

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -81,6 +82,11 @@ class GroundLink:
     def next_us(self) -> int:
         """Simulated time before which there is nothing to `report`, unless the ground asks for something."""
         return min([self.failures.next_us, *(schedule.next_us for _, schedule in self._flows)])
+
+    @property
+    def next_wall(self) -> float:
+        """Wall time (monotonic, s) before which there is nothing either: what has been armed knows no wall clock."""
+        return -math.inf if self.failures.armed else min(schedule.next_wall for _, schedule in self._flows)
 
     def attend(self) -> None:
         """Between ticks, also while the swarm is held: HEARTBEAT, and what must not wait for ever."""

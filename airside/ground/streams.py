@@ -338,6 +338,11 @@ class Schedule:
         """Simulated time before which nothing is due."""
         return self._next_us
 
+    @property
+    def next_wall(self) -> float:
+        """Wall time (monotonic, s) before which nothing is due either."""
+        return self._next_wall
+
     def set(self, n: int, rate: float) -> None:
         """Set the rate of stream ``n``, Hz; 0 = silent."""
         self._rates[n] = rate

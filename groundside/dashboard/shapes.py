@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ftcc.groundside.palette import Color
 from ftcc.link.rotation import body_attitude, body_axes, quaternion_product
 from ftcc.sim.plant import TRUTH
-from ftcc.sim.sensors import STATE_MESSAGE, encode_state
+from ftcc.link.wire import STATE
+from ftcc.sim.sensors import encode_state
 
 __all__ = ["SPAN", "Poses", "airframe", "arrows", "outline", "stick_colors", "sticks"]
 
@@ -45,7 +46,7 @@ class Poses:
     """Where an aircraft is drawn, and how it lies in the air there."""
 
     def __init__(self) -> None:
-        self._message = np.zeros(len(STATE_MESSAGE))
+        self._message = np.zeros(len(STATE))
 
     def of(
         self,

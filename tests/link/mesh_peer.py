@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import struct
 import sys
 import time
@@ -16,7 +17,7 @@ from ftcc.link.mesh import Mesh
 
 
 class Peer:
-    """The commands; numbered records are a UAV's id and a number."""
+    """The commands; numbered transmissions are a process's name and a number."""
 
     def open(self, **arguments: Any) -> list[str]:
         self.mesh = Mesh(**arguments)
@@ -31,11 +32,11 @@ class Peer:
     def awaited(self) -> list[str]:
         return self.mesh.awaited
 
-    def publish(self, uav: int, first: int, last: int) -> None:
+    def publish(self, own: int, first: int, last: int) -> None:
         for n in range(first, last):
-            self.mesh.publish(uav, struct.pack("<ii", uav, n))
+            self.mesh.publish(struct.pack("<ii", own, n))
 
-    def exchange(self, uav: int, count: int, ahead: int, seconds: float) -> list[list[int]]:
+    def exchange(self, own: int, count: int, ahead: int, seconds: float) -> list[list[int]]:
         """Publish ``count`` records, never more than ``ahead`` beyond those received; what was received."""
         arrived: list[list[int]] = []
         sent = 0
@@ -43,13 +44,13 @@ class Peer:
         while (sent < count or len(arrived) < count) and time.monotonic() < until:
             arrived += self._unpacked()
             while sent < min(count, len(arrived) + ahead):
-                self.publish(uav, sent, sent + 1)
+                self.publish(own, sent, sent + 1)
                 sent += 1
             time.sleep(0.0002)
         return arrived
 
     def _unpacked(self) -> list[list[int]]:
-        return [list(struct.unpack("<ii", payload)) for payload in self.mesh.receive()]
+        return [list(struct.unpack("<ii", payload)) for _, payload in self.mesh.receive()]
 
     def receive(self, count: int, seconds: float) -> list[list[int]]:
         """All that comes until ``count`` records are there."""
@@ -59,6 +60,10 @@ class Peer:
             arrived += self._unpacked()
             time.sleep(0.001)
         return arrived
+
+    def sleep(self, seconds: float) -> list[list[int]]:
+        """What there is when the mesh has woken this process up, or nothing after ``seconds``."""
+        return self._unpacked() if select.select([self.mesh], [], [], seconds)[0] else []
 
     def poll(self, seconds: float) -> list[list[int]]:
         """What one reading gives after a pause: real time."""

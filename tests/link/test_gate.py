@@ -67,16 +67,17 @@ def test_a_hold_is_a_limit_that_steps_move_on(ends):
     assert gate.open(6)
 
 
-def test_ticks_are_due_on_one_grid_from_the_epoch(ends):
+def test_a_new_pace_is_taken_once(ends):
     launcher, gate = ends
     launcher.send(Go(Pace(100.0, 0, 1.0), Limit(None)))
     gate.wait_until_go()
-    assert gate.due(0, 0.01) == 100.0
-    assert gate.due(250, 0.01) == pytest.approx(102.5)
+    assert gate.take_pace() == Pace(100.0, 0, 1.0)
+    assert gate.take_pace() is None
     launcher.send(Pace(103.0, 300, 4.0))
+    launcher.send(Pace(104.0, None, 2.0))
     gate.read()
-    assert gate.due(300, 0.01) == 103.0
-    assert gate.due(700, 0.01) == pytest.approx(104.0)
+    assert gate.take_pace() == gate.pace == Pace(104.0, None, 2.0)
+    assert gate.take_pace() is None
 
 
 def test_the_newest_word_counts_and_nothing_is_left_over(ends):

@@ -11,21 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from ftcc.link.mavlink import (
-    AUTOPILOT,
-    LOOPBACK,
-    SIMULATOR,
-    Endpoint,
-    command_message,
-    dialect,
-    float_array,
-    read_command,
-    read_state,
-    read_target,
-    state_messages,
-    status_text,
-    target_message,
-)
+from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, SIMULATOR, Endpoint, dialect, float_array, status_text
+from tests.pymavlink_wire import command_message, read_command, read_state, state_messages
 
 
 class Pair:
@@ -115,46 +102,12 @@ def test_attitude_position_and_command_in_force_travel_in_one_datagram(pair):
     assert (messages[0].get_srcSystem(), messages[0].get_srcComponent()) == (1, AUTOPILOT)
 
 
-def test_the_command_in_force_is_told_only_where_the_autopilot_does_not_know_it(pair):
-    pair.vehicle.send(pair.bytes_of(*state_messages(20_000, np.zeros(13), None)))
-    state, force = np.zeros(13), np.full(4, 7.0)
-    messages = arrived(pair.autopilot)
-    assert read_state(messages, state, force) == (20_000, 2)
-    assert (force == 7.0).all()
-    # The next tick's messages do not belong to this one.
-    assert read_state([*messages, *state_messages(30_000, np.zeros(13), np.zeros(4))], state, force) == (20_000, 2)
-
-
 def test_command_arrives_with_the_stamp_of_the_state_that_it_answers(pair):
     sent = np.float32([0.0, -0.28125714, 0.0, 0.532575]).astype(np.float64)
     pair.vehicle.send(pair.bytes_of(command_message(123_450_000, sent)))
     controls = np.zeros(4)
     assert read_command(arrived(pair.autopilot)[0], controls) == 123_450_000
     assert np.array_equal(controls, sent)
-
-
-def test_target_of_a_leader_is_altitude_up_on_both_sides_and_down_on_the_wire(pair):
-    sent = np.array([12.5, 375.0, 20.0, 1010.5, 30.0, 0.0, 1.25])
-    pair.vehicle.send(pair.bytes_of(target_message(7, sent)))
-    message = arrived(pair.autopilot)[0]
-    assert (message.z, message.vz) == (-1010.5, -1.25)
-    assert message.coordinate_frame == dialect.MAV_FRAME_LOCAL_NED
-    target = np.zeros(7)
-    assert read_target(message, target) == 12_500_000
-    assert np.array_equal(target, sent)
-
-
-def test_messages_of_another_kind_or_of_two_ticks_are_no_state_and_no_command():
-    state, controls, target = np.zeros(13), np.zeros(4), np.zeros(7)
-    now = state_messages(10_000, np.ones(13), np.ones(4))
-    later = state_messages(20_000, np.ones(13), np.ones(4))
-    assert read_state(now, state, controls) == (10_000, 3)
-    for wrong in (now[:1], (now[0], later[1], now[2]), (now[1], now[0], now[2]), ()):
-        state[:] = 5.0
-        assert read_state(wrong, state, controls)[0] == -1
-        assert (state == 5.0).all()
-    assert read_command(now[0], controls) == -1
-    assert read_target(now[0], target) == -1
 
 
 def test_numbers_for_the_ground_and_texts_are_made_to_fit(pair):
@@ -274,16 +227,9 @@ def test_a_peer_that_is_not_there_harms_nobody(pair):
         assert pair.autopilot.receive() == []
     pair.vehicle = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     pair.vehicle.bind(gone)
-    pair.autopilot.send_again()
-    pair.autopilot.send_again()
+    pair.autopilot.send(command_message(0, np.zeros(4)))
+    pair.autopilot.send(command_message(0, np.zeros(4)))
     assert pair.vehicle.recv(4096)
-
-
-def test_what_is_sent_again_is_the_same_datagram(pair):
-    pair.autopilot.send_again()  # nothing was sent yet
-    pair.autopilot.send(command_message(7_000, np.ones(4)))
-    pair.autopilot.send_again()
-    assert pair.vehicle.recv(4096) == pair.vehicle.recv(4096)
 
 
 def test_an_endpoint_listens_on_loopback_only(pair):

@@ -5,9 +5,20 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from ftcc.link.recording import Column, EventLog, PartWriter, part_path, read_events, read_part
+from ftcc.link.recording import (
+    ROWS,
+    Column,
+    EventLog,
+    PartWriter,
+    Recorder,
+    is_full,
+    part_path,
+    read_events,
+    read_part,
+)
 
 COLUMNS = (Column("t", "s", "simulated time"), Column("uav", "-", "id"), Column("z", "m", "altitude, up"))
 
@@ -15,8 +26,10 @@ COLUMNS = (Column("t", "s", "simulated time"), Column("uav", "-", "id"), Column(
 def test_a_part_gives_back_its_rows_units_and_meanings(tmp_path: Path) -> None:
     path = part_path(tmp_path, 3, "vehicle")
     writer = PartWriter(path, COLUMNS)
-    for k in range(1234):
-        writer.row((k / 100, 3, 1000.0 + k))
+    rows = np.array([(k / 100, 3, 1000.0 + k) for k in range(1234)])
+    writer.write(rows[:500])
+    writer.write(rows[500:500])
+    writer.write(rows[500:])
     writer.close()
     writer.close()
     table = read_part(path)
@@ -31,17 +44,36 @@ def test_a_part_gives_back_its_rows_units_and_meanings(tmp_path: Path) -> None:
 def test_a_part_whose_writer_was_killed_is_whole_up_to_its_last_batch(tmp_path: Path, torn: int) -> None:
     path = part_path(tmp_path, 1, "vehicle")
     writer = PartWriter(path, COLUMNS)
-    for k in range(500):
-        writer.row((k / 100, 1, math.pi * k))
-    writer.flush()
+    rows = np.array([(k / 100, 1, math.pi * k) for k in range(700)])
+    writer.write(rows[:500])
     whole = path.stat().st_size
-    for k in range(500, 700):
-        writer.row((k / 100, 1, math.pi * k))
-    writer.flush()
+    writer.write(rows[500:])
     with path.open("r+b") as file:
         file.truncate(whole + torn)
     table = read_part(path)
     assert table.column("z").to_pylist() == [math.pi * k for k in range(500)]
+
+
+def test_a_recorder_writes_the_rows_that_each_uav_has_filled(tmp_path: Path) -> None:
+    paths = [part_path(tmp_path, uav, "vehicle") for uav in (1, 2)]
+    recorder = Recorder([paths[0], None, paths[1]], COLUMNS)
+    rows = recorder.rows
+    for k in range(ROWS):
+        assert not is_full(rows)
+        rows.values[0, rows.filled[0]] = (k / 100, 1, k)
+        rows.filled[0] += 1
+    rows.values[2, 0] = (0.0, 2, -1.0)
+    rows.filled[2] = 1
+    assert is_full(rows)
+    recorder.write_if_due()
+    assert rows.filled.tolist() == [0, 0, 0]
+    rows.values[0, 0] = (5.0, 1, 7.0)
+    rows.filled[0] = 1
+    recorder.write_if_due()
+    assert rows.filled[0] == 1, "neither full nor old"
+    recorder.close()
+    assert read_part(paths[0]).column("z").to_pylist() == [*map(float, range(ROWS)), 7.0]
+    assert read_part(paths[1]).column("z").to_pylist() == [-1.0]
 
 
 def test_a_part_without_a_schema_is_no_part(tmp_path: Path) -> None:

@@ -34,15 +34,14 @@ class Flight:
 
     def fly(self, ticks: int, elevator: float) -> None:
         """Fly on under a commanded elevator (rad)."""
-        one, true, seen = np.ones(1, np.int64), np.zeros((1, 13)), np.zeros(13)
-        message, controls = np.zeros((1, 13)), np.zeros((1, 4))
+        true, seen, state, controls = np.zeros(13), np.zeros(13), np.zeros(13), np.zeros(4)
         for _ in range(ticks):
             tick = len(self.acting)
             self.fleet.command[0, ELEVATOR] = elevator
-            cycle.report_state(self.fleet, one, tick, tick * 10 * MS, 1, true, seen, message, controls)
+            cycle.sense(self.fleet, 0, tick, tick * 10 * MS, 1, true, seen, state, controls)
             self.acting.append(float(self.fleet.acting[0, ELEVATOR]))
-            self.messages.append(message[0].copy())
-            cycle.fly_period(self.fleet, one, tick * 10 * MS, 10 * MS, MS, np.zeros(1, np.int64))
+            self.messages.append(state.copy())
+            cycle.advance(self.fleet, 0, tick * 10 * MS, 10 * MS, MS)
 
 
 LAGGED = {"lag": (0.0, 20.0, 0.0, 20.0)}

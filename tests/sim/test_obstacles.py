@@ -53,8 +53,6 @@ def test_a_list_that_nobody_empties_keeps_what_came_first() -> None:
 def test_a_vehicle_in_a_zone_is_noted_in_its_tick() -> None:
     low = (30.0, 3000.0, 400.0, 0.0, 0.0322, 0.0)
     fleet = build([vehicle(1, obstacles=HILLS), vehicle(2, obstacles=HILLS, initial=low)])
-    alive, true = np.ones(2, np.int64), np.zeros((2, 13))
-    cycle_of("longitudinal").report_state(
-        fleet, alive, 7, 70_000, 1, true, np.zeros(13), np.zeros((2, 13)), np.zeros((2, 4))
-    )
+    for i in range(2):
+        cycle_of("longitudinal").sense(fleet, i, 7, 70_000, 1, np.zeros(13), np.zeros(13), np.zeros(13), np.zeros(4))
     assert drained(fleet.happenings) == [(70_000, 1, ENTERED, 1)]

@@ -9,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ftcc.airside.flight_path import Own, decode_state
+from ftcc.link.wire import STATE
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
-from ftcc.sim.sensors import STATE_MESSAGE, encode_state
+from ftcc.sim.sensors import encode_state
 from ftcc.sim.spec import build
 from tests.swarm import noise, vehicle
 
@@ -29,7 +30,7 @@ FLOAT32 = 2.0**-23
 
 
 def encoded(measured: np.ndarray) -> np.ndarray:
-    message = np.zeros(len(STATE_MESSAGE))
+    message = np.zeros(len(STATE))
     encode_state(measured, message)
     return message
 
@@ -96,8 +97,8 @@ def test_altitude_is_up_in_laws_and_down_in_messages():
     state = np.zeros(len(TRUTH))
     state[TRUTH.index("z")], state[TRUTH.index("V")], state[TRUTH.index("gamma")] = 1000.0, 30.0, 0.1
     message = encoded(state)
-    assert message[STATE_MESSAGE.index("z")] == -1000.0
-    assert message[STATE_MESSAGE.index("vz")] == pytest.approx(-30.0 * math.sin(0.1))
+    assert message[STATE.index("z")] == -1000.0
+    assert message[STATE.index("vz")] == pytest.approx(-30.0 * math.sin(0.1))
 
 
 def test_stamp_and_command_in_force_are_handed_on():
