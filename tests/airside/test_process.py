@@ -10,8 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from ftcc.link.mavlink import dialect, float_array, read_command, state_messages
+from ftcc.link.mavlink import dialect, float_array
+from ftcc.link.waiting import DATAGRAM
 from tests.airside.autopilot_bench import Bench, forged
+from tests.pymavlink_wire import read_command, state_messages
 
 LEVEL = forged(1000.0, 30.0, 0.0, 0.0322, 0.0)
 
@@ -30,10 +32,15 @@ def state(tick: int) -> tuple[object, ...]:
 
 
 def taken(bench: Bench) -> list[int]:
-    """Ticks of the states that the crew has taken in when its socket is empty."""
-    while select.select([bench.crew.vehicles[0]], [], [], 0.05)[0]:
-        bench.crew.listen(0)
-    return [tick for tick, _, _ in bench.crew.states[0]]
+    """Ticks of the states that the crew takes in, one after the other, until its socket is empty."""
+    crew, ticks = bench.crew, []
+    while select.select([crew.vehicles[0]], [], [], 0.05)[0]:
+        if crew.flight.listen(crew.group, crew.timing) == DATAGRAM:
+            crew.take_datagram()
+        if crew.group.pending[0] >= 0:
+            ticks.append(int(crew.group.pending[0]))
+            crew.group.done[0], crew.group.pending[0] = crew.group.pending[0], -1
+    return ticks
 
 
 def test_states_are_taken_in_order_and_once(bench):
@@ -69,9 +76,9 @@ def test_an_autopilot_whose_aircraft_is_lost_answers_the_states_before_that_and_
     bench.vehicle.send(lost)
     with bench:
         until = time.monotonic() + 10.0
-        while bench.crew.alive.any() and time.monotonic() < until:
+        while bench.crew.group.alive.any() and time.monotonic() < until:
             time.sleep(0.001)
-        assert not bench.crew.alive.any(), "nobody need stop it"
+        assert not bench.crew.group.alive.any(), "nobody need stop it"
     stamps = [read_command(message, np.zeros(4)) for message in bench.vehicle.receive()]
     assert list(dict.fromkeys(stamps)) == [0, 10_000, 20_000]
 
