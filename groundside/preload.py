@@ -18,6 +18,7 @@ from ftcc.airside import process as autopilot_process
 from ftcc.airside.autopilots import placeholder as no_autopilot
 from ftcc.airside.group import build_group as build_autopilots
 from ftcc.airside.group import flight_of as flight_of_autopilots
+from ftcc.link.exchange import begin, take_in
 from ftcc.link.recording import LINK_COLUMNS, new_rows
 from ftcc.link.timing import Timing
 from ftcc.sim import process as vehicle_process
@@ -40,6 +41,9 @@ def load(scheme: str, plant: str) -> None:
     rows, link_rows = (new_rows(1, len(columns)) for columns in (autopilot_process.columns(scheme), LINK_COLUMNS))
     autopilots = build_autopilots([no_autopilot(scheme)], timing, rows, link_rows)
     autopilot_process.load_compiled(autopilots, timing, flight_of_autopilots(scheme))
+    # Called from Python where transmissions go out and come in: loaded by each child, they would cost it 5 MB.
+    begin(autopilots.transmission, 0, 0, 0, 1)
+    take_in(autopilots.transmission, autopilots.exchange)
     vehicles = build_vehicles([no_vehicle(plant)], new_rows(1, len(vehicle_process.columns(plant))), 1)
     vehicle_process.load_compiled(vehicles, timing, flight_of_vehicles(plant))
 
