@@ -52,6 +52,7 @@ class Links:
         x, y = self._plan_vectors.T / np.linalg.norm(self._plan_vectors, axis=1)
         self._plan_notes = self._plan_origins + 0.62 * self._plan_vectors + _ASIDE * np.column_stack((y, -x))
         """Nearer to who hears, and beside the arrow: those of the two directions stand apart."""
+        self._all = np.arange(len(self._edges))
         self._states = np.full(len(self._edges), -1)
         """What comes through each edge, as an index of `_TINTS`; as drawn last."""
         self._drawn: NDArray[np.intp] = np.zeros(0, np.intp)
@@ -96,11 +97,11 @@ class Links:
         links = [_link(snapshot.uavs, sender, receiver) for sender, receiver in self._edges]
         states = np.array([self._state(link) for link in links])
         drawn = self._in_sight(states)
-        start, end = self._ends[drawn].T
-        origins, vectors = arrows(positions[start], positions[end], gap, 0.12 * gap)
+        ends = positions[self._ends[drawn]]
+        origins, vectors = arrows(ends[:, 0], ends[:, 1], gap, 0.12 * gap)
         entries = [Entry("/world/links", t, rr.Arrows3D.from_fields(origins=origins, vectors=vectors))]
-        changed = not np.array_equal(states, self._states)
-        if changed or not np.array_equal(drawn, self._drawn):
+        changed = (states != self._states).any()
+        if changed or (drawn is not self._drawn and not np.array_equal(drawn, self._drawn)):
             tints, widths = self._look(states[drawn])
             entries.append(Entry("/world/links", t, rr.Arrows3D.from_fields(colors=tints, radii=widths)))
         if changed:
@@ -122,7 +123,7 @@ class Links:
     def _in_sight(self, states: NDArray[np.int_]) -> NDArray[np.intp]:
         """Edges that are drawn among the aircraft: in a big swarm those of the ones in full, and those without news."""
         if not self._detail.crowded:
-            return np.arange(len(self._edges))
+            return self._all
         full = np.isin(self._uavs, self._detail.shown)
         return np.flatnonzero(full[self._ends].all(axis=1) | (states != _FRESH))
 

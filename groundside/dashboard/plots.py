@@ -34,10 +34,13 @@ class Plots:
     def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
         self._detail = detail
-        self._leaders_at_first = {uav for uav in detail.shown if uav in subject.leaders}
+        self._leaders = set(subject.leaders)
+        self._leaders_at_first = self._leaders & set(detail.shown)
         self._colors = colors(subject.graph.uavs)
         self._groups = panels_of(subject)
         self._panels = [panel for panels in self._groups.values() for panel in panels]
+        self._uavs, self._followers = self._whose(everybody=True), self._whose(everybody=False)
+        """Whose curves panels show, and whose of them that only followers have."""
 
     def views(self) -> dict[str, list[rrb.View]]:
         """One view to a panel, by group."""
@@ -55,7 +58,10 @@ class Plots:
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
         """The values of one instant; ``new`` are those that have just come into view."""
         t = snapshot.t
-        entries = self.static() if new else []
+        entries: list[Entry] = []
+        if new:
+            self._uavs, self._followers = self._whose(everybody=True), self._whose(everybody=False)
+            entries += self.static()
         entries += [Entry(_curves_of(panel), t, rr.Scalars(self._values(panel, snapshot))) for panel in self._panels]
         for panel in self._panels:
             if panel.band:
@@ -64,16 +70,16 @@ class Plots:
 
     def _curves(self, panel: Panel) -> list[Curve]:
         """What `_values` gives, in the same order."""
-        uavs = self._uavs(panel)
-        leaders = self._subject.leaders
+        uavs = self._uavs if panel.everybody else self._followers
+        leaders = self._leaders
         # The farther a curve is behind in this list, the farther in front it is drawn.
         curves = [("lowest of all", _REACH, 1.0), ("highest of all", _REACH, 1.0)] if self._detail.crowded else []
         curves += [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
         if panel.second is not None:
-            curves += [self._curve(uav, f" {panel.second[1]}", 0.7) for uav in self._followers(uavs)]
+            curves += [self._curve(uav, f" {panel.second[1]}", 0.7) for uav in self._followers]
         if isinstance(panel.bound, str):
             for side in ("upper", "lower"):
-                bounds = [self._curve(uav, f" {side} bound", 1.0) for uav in self._followers(uavs)]
+                bounds = [self._curve(uav, f" {side} bound", 1.0) for uav in self._followers]
                 curves += [(called, GRAY, width) for called, _, width in bounds]
         elif panel.bound is not None:
             curves += [("upper bound", GRAY, 1.0), ("lower bound", GRAY, 1.0)]
@@ -88,10 +94,10 @@ class Plots:
         return ("", GRAY, width) if uav is None else (name(uav) + what, self._colors[uav], width)
 
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
-        uavs = self._uavs(panel)
+        uavs = self._uavs if panel.everybody else self._followers
         values = self._reach(panel, snapshot) if self._detail.crowded else []
         values += [panel.read(panel.value, _state(snapshot, uav)) for uav in uavs]
-        followers = [_state(snapshot, uav) for uav in self._followers(uavs)]
+        followers = [_state(snapshot, uav) for uav in self._followers]
         if panel.second is not None:
             values += [panel.read(panel.second, state) for state in followers]
         if isinstance(panel.bound, str):
@@ -113,17 +119,14 @@ class Plots:
         told = [value for value in everybody if math.isfinite(value)]
         return [min(told, default=math.nan), max(told, default=math.nan)]
 
-    def _uavs(self, panel: Panel) -> list[int | None]:
-        """Whose curves these are; None keeps a place for whoever comes into view."""
-        detail, leaders = self._detail, self._subject.leaders
+    def _whose(self, everybody: bool) -> list[int | None]:
+        """Whose curves there are, of everybody or of followers; None keeps a place for whoever comes into view."""
+        detail = self._detail
         places = [*detail.shown, *[None] * (detail.room - len(detail.shown))]
-        if panel.everybody:
+        if everybody:
             return places
         # Places must not move: a leader that comes into view later leaves an empty one.
-        return [None if uav in leaders else uav for uav in places if uav not in self._leaders_at_first]
-
-    def _followers(self, uavs: Sequence[int | None]) -> list[int | None]:
-        return [None if uav in self._subject.leaders else uav for uav in uavs if uav not in self._leaders_at_first]
+        return [None if uav in self._leaders else uav for uav in places if uav not in self._leaders_at_first]
 
     def _band(self, panel: Panel, snapshot: Snapshot) -> list[Entry]:
         """What lies between the leaders. Rerun shades one standard deviation about a measured value."""

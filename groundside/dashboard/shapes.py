@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.palette import Color
 from ftcc.link.rotation import body_attitude, body_axes, quaternion_product
-from ftcc.sim.plant import TRUTH
 from ftcc.link.wire import STATE
+from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import encode_state
 
 __all__ = ["SPAN", "Poses", "airframe", "arrows", "outline", "stick_colors", "sticks"]
