@@ -123,7 +123,7 @@ class PartWriter:
     """
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        import pyarrow as pa  # never before the fork
+        import pyarrow as pa  # who writes nothing needs no Arrow
 
         self._pa = pa
         self.path = Path(path)

@@ -33,7 +33,7 @@ MAY_IMPORT = {
 ONLY_ON_THE_GROUND = {"pydantic", "typer", "rich", "rerun", "matplotlib"}
 """Libraries that no child process imports, at whatever moment."""
 
-NOT_BEFORE_THE_FORK = ONLY_ON_THE_GROUND | {"zenoh", "pyarrow"}
+NOT_BEFORE_THE_FORK = ONLY_ON_THE_GROUND | {"zenoh"}
 
 
 def sources(folder: str) -> list[Path]:
@@ -99,8 +99,8 @@ def test_one_module_imports_numba():
     assert found == {"link/compiled.py"}
 
 
-def test_what_is_forked_has_loaded_neither_mesh_nor_files_nor_ground():
-    """A child of a process that had opened Zenoh never sends; pyarrow and rerun start threads."""
+def test_what_is_forked_has_loaded_neither_mesh_nor_ground():
+    """A child of a process that had opened Zenoh never sends; rerun starts threads."""
     program = (
         "import sys, threading; import ftcc.groundside.preload\n"
         f"print(*[name for name in {sorted(NOT_BEFORE_THE_FORK)!r} if name in sys.modules])\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -15,12 +16,12 @@ HEAVY = {"numba", "numpy", "scipy", "pydantic", "pyarrow", "pymavlink", "zenoh",
 """Each takes longer to load than a command that only tells has to answer."""
 
 
-def loaded(program: str) -> set[str]:
+def loaded(program: str, **environment: str) -> set[str]:
     """The modules that a program has loaded when it ends."""
     hidden = ("FTCC_PRELOAD_SCHEME", "NUMBA_DISABLE_JIT")
     finished = subprocess.run(
         [sys.executable, "-c", f"import sys\n{program}\nprint('loaded', *sys.modules)"],
-        env={name: value for name, value in os.environ.items() if name not in hidden},
+        env={name: value for name, value in os.environ.items() if name not in hidden} | environment,
         capture_output=True,
         text=True,
         check=False,
@@ -31,10 +32,23 @@ def loaded(program: str) -> set[str]:
 
 def test_what_is_forked_has_loaded_nothing_that_its_children_do_not_need():
     """Whatever it loads costs every swarm its start."""
-    found = loaded("import ftcc.groundside.preload")
-    assert "numba" in found
+    found = loaded(
+        "import ftcc.groundside.preload", FTCC_PRELOAD_SCHEME="containment", FTCC_PRELOAD_PLANT="longitudinal"
+    )
+    assert {"numba", "pyarrow"} <= found
     assert not found & GROUND
     assert not [name for name in found if name.startswith(("ftcc.groundside.schema", "ftcc.groundside.scenario"))]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads as Linux shows them")
+def test_what_is_forked_has_no_threads():
+    """Not Python's alone: of those that a library starts, such as Arrow's allocator, no child would have any."""
+    loaded(
+        "import os, ftcc.groundside.preload\nassert len(os.listdir('/proc/self/task')) == 1",
+        FTCC_PRELOAD_SCHEME="containment",
+        FTCC_PRELOAD_PLANT="longitudinal",
+        OPENBLAS_NUM_THREADS="1",
+    )
 
 
 @pytest.mark.parametrize("command", ["list", "ps", "--help"])
