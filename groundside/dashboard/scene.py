@@ -47,7 +47,8 @@ class Scene:
 
     The centre moves with the swarm, so that hundreds of metres of common forward flight do not carry it out of sight;
     positions in the data are the true ones, but for lanes: aircraft that share one vertical plane, as those of
-    longitudinal schemes do, are moved east by `LANE` each; those of a big swarm that fly abreast are put in ranks.
+    longitudinal schemes do, are moved east by `LANE` each; those of a big swarm that fly in one line abreast, which
+    would be kilometres long, are put in ranks.
     """
 
     def __init__(self, subject: Subject, first: Snapshot, detail: Detail) -> None:
@@ -62,9 +63,8 @@ class Scene:
         self._ranks = 1
         self._positions = np.full((len(self._uavs), 3), np.nan)
         self._place(first)
-        if len(self._uavs) > 1 and np.nanmax(self._positions[:, 0]) - np.nanmin(self._positions[:, 0]) < 1.0:
-            self._take_lanes()
-            self._place(first)
+        self._take_lanes()
+        self._place(first)
         seen = self._seen()
         self._centre: NDArray[np.float64] = seen.mean(axis=0) if len(seen) else np.zeros(3)
         self._radius = max(30.0, float(np.linalg.norm(seen - self._centre, axis=1).max(initial=0.0)))
@@ -78,7 +78,7 @@ class Scene:
             for state, signals in wanted.items()
             if names & set(signals)
         }
-        self._surroundings = Surroundings(subject, self._positions)
+        self._surroundings = Surroundings(subject, self._positions, in_ranks=self._ranks > 1)
         self.links = Links(subject, detail)
         self._others: list[int] = []
         """Who was drawn as a stick last."""
@@ -89,7 +89,7 @@ class Scene:
     def title(self) -> str:
         """What the view shows, for its name."""
         notes = [f"airframes x{self._scale}"] if self._scale > 1 else []
-        ranks = f" in {self._ranks} ranks" if self._ranks > 1 else ""
+        ranks = f" in {self._ranks} ranks, truly abreast" if self._ranks > 1 else ""
         notes += [f"side by side at {LANE:g} m{ranks}"] if self._lanes.any() else []
         notes += ["outlines: references"] if self._references else []
         notes += self._surroundings.notes
@@ -219,15 +219,24 @@ class Scene:
         return np.array((truth["y"] + east, truth["x"] + north, truth["z"]))
 
     def _take_lanes(self) -> None:
-        """Aircraft above one another are drawn side by side, those of a big swarm in ranks."""
-        n = len(self._uavs)
-        # Where places along the flight mean something, they must stay.
-        in_ranks = self._detail.crowded and not self._subject.obstacles and np.ptp(self._seen()[:, 1]) < 1.0
-        abreast = math.ceil(math.sqrt(2 * n)) if in_ranks else n
-        rank, lane = np.divmod(np.arange(n), abreast)
-        self._ranks = int(rank[-1]) + 1
-        self._lanes[:, 0] = LANE * (lane - 0.5 * (abreast - 1))
-        self._lanes[:, 1] = -_RANK * rank
+        """Put aircraft of one vertical plane side by side; of a big swarm also those of one line abreast, in ranks."""
+        n, seen = len(self._uavs), self._seen()
+        if n < 2 or not len(seen):
+            return
+        in_plane, abreast = (np.ptp(seen[:, :2], axis=0) < 1.0).tolist()
+        # Where places along or across the flight mean something, they must stay.
+        longitudinal = self._subject.family in ("containment", "formation")
+        in_ranks = self._detail.crowded and abreast and longitudinal and not self._subject.obstacles
+        if not (in_plane or in_ranks):
+            return
+        width = math.ceil(math.sqrt(2 * n)) if in_ranks else n
+        places = np.argsort(np.argsort(self._positions[:, 0], kind="stable")) if in_ranks else np.arange(n)
+        rank, lane = np.divmod(places, width)
+        self._ranks = int(rank.max()) + 1
+        self._lanes[:, 0] = LANE * (lane - 0.5 * (width - 1))
+        if in_ranks:
+            self._lanes[:, 0] -= np.nan_to_num(self._positions[:, 0])
+            self._lanes[:, 1] = -_RANK * rank
 
     def _company(self, snapshot: Snapshot) -> NDArray[np.float64]:
         """Positions of those about whom a frame is drawn: of a big swarm not of followers who have been left behind."""

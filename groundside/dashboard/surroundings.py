@@ -29,15 +29,19 @@ _DEEP = 200.0
 
 
 class Surroundings:
-    """Draws the hull about the swarm, and the obstacles beneath it."""
+    """Draws the hull about the swarm, and the obstacles beneath it.
 
-    def __init__(self, subject: Subject, positions: NDArray[np.float64]) -> None:
+    ``positions`` (n, 3) are where the UAVs are drawn first; ``in_ranks``: they truly fly abreast.
+    """
+
+    def __init__(self, subject: Subject, positions: NDArray[np.float64], in_ranks: bool = False) -> None:
         self._subject = subject
         seen = positions[np.isfinite(positions[:, 0])] if np.isfinite(positions).any() else np.zeros((1, 3))
         self._west, self._east = float(seen[:, 0].min()) - _MARGIN, float(seen[:, 0].max()) + _MARGIN
         self._leaders = [sorted(subject.graph.uavs).index(uav) for uav in subject.leaders]
         self._front_at = -math.inf
-        self._boxed = len(self._leaders) > 1 and float(np.ptp(positions[self._leaders, 1])) > _APART
+        apart = len(self._leaders) > 1 and float(np.ptp(positions[self._leaders, 1])) > _APART
+        self._boxed = apart and not in_ranks
 
     @property
     def notes(self) -> list[str]:

@@ -171,9 +171,13 @@ def test_a_swarm_that_flies_fast_is_not_taken_for_silent() -> None:
     assert Detail(subject(100)).follow(fast) == []
 
 
-def test_those_who_fly_abreast_in_one_plane_stand_in_ranks() -> None:
-    artists = Artists(subject(100), snapshot(100, 0.0, abreast=True))
+@pytest.mark.parametrize("apart", [0.0, 30.0])
+def test_those_who_fly_abreast_stand_in_ranks(apart: float) -> None:
+    plane = snapshot(100, 0.0, abreast=True)
+    line = {uav: dataclasses.replace(s, truth={**s.truth, "y": apart * uav}) for uav, s in plane.uavs.items()}
+    artists = Artists(subject(100), Snapshot(0.0, line))
     assert "ranks" in artists._scene.title
+    assert "frames" in artists._scene.title
     spread = np.ptp(artists._scene._positions, axis=0)
     assert spread[0] < 250.0
     assert spread[1] < 250.0
