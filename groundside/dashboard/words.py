@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ftcc.groundside.snapshot import Snapshot, UavState
+import math
+
+from ftcc.groundside.snapshot import Pace, Snapshot, UavState
 
 __all__ = ["faults", "faulty", "in_trouble", "is_silent", "label", "name", "silent_since"]
 
@@ -50,8 +52,17 @@ def is_silent(uav: UavState, snapshot: Snapshot) -> bool:
 
     Telemetry comes ten times a second of wall time at most, so that in a fast swarm it is older in simulated time.
     """
-    fast = snapshot.pace.factor if snapshot.pace is not None and snapshot.pace.factor > 1.0 else 1.0
-    return snapshot.t - uav.t > _SILENT * fast
+    age = snapshot.t - uav.t
+    return age > _SILENT and age > _SILENT * _fastest(snapshot.pace)
+
+
+def _fastest(pace: Pace | None) -> float:
+    """How many times real time the swarm may be flying."""
+    if pace is None:
+        return 1.0
+    if pace.asked is None:
+        return math.inf if math.isnan(pace.factor) else pace.factor
+    return pace.asked if math.isnan(pace.factor) else max(pace.asked, pace.factor)
 
 
 def in_trouble(uav: UavState, snapshot: Snapshot) -> bool:

@@ -162,13 +162,23 @@ def test_the_table_tells_of_those_in_trouble_first(flown: Flown) -> None:
     assert len(rows) <= FULL
 
 
-def test_a_swarm_that_flies_fast_is_not_taken_for_silent() -> None:
+@pytest.mark.parametrize(
+    ("pace", "silent"),
+    [
+        (None, [9]),
+        (Pace(1.0, 1.0), [9]),
+        (Pace(0.5, 1.0), [9]),
+        (Pace(20.0, None), []),
+        (Pace(math.nan, None), []),
+        (Pace(math.nan, 5.0), []),
+        (Pace(1.1, 5.0), []),
+    ],
+)
+def test_a_swarm_that_flies_fast_is_not_taken_for_silent(pace: Pace | None, silent: list[int]) -> None:
     late = snapshot(100, 3.0)
     uavs: dict[int, UavState] = dict(late.uavs)
     uavs[9] = dataclasses.replace(uavs[9], t=1.0)
-    slow, fast = Snapshot(3.0, uavs), Snapshot(3.0, uavs, pace=Pace(20.0, None))
-    assert Detail(subject(100)).follow(slow) == [9]
-    assert Detail(subject(100)).follow(fast) == []
+    assert Detail(subject(100)).follow(Snapshot(3.0, uavs, pace=pace)) == silent
 
 
 @pytest.mark.parametrize("apart", [0.0, 30.0])
