@@ -1,36 +1,54 @@
-"""Prints what flights and their parts cost on this machine.
+"""Prints what flights and their parts cost on this machine: ``python -m tests.bench [PART ...]``.
 
-Ratios (times real time) are measured in one run each; compare runs on the same quiet machine only.
+A machine that does other things, too, or that others share, is not the same machine a minute later. Therefore what is
+compared is measured in turn, again and again, and medians are shown; compare numbers of one run with each other only.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
+import math
 import os
+import platform
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ftcc.airside.autopilots import build, tick_of
-from ftcc.airside.flight_path import Own
 from ftcc.groundside.mission import Mission, resolve
+from ftcc.groundside.pace import usable_cores
 from ftcc.groundside.scenario import load, shipped
-from ftcc.groundside.simulate import fly, simulate
+from ftcc.groundside.simulate import fly as simulate_in_memory
+from ftcc.groundside.simulate import simulate
+from tests.bench.flights import FTCC, Flight, fly
+from tests.bench.stages import LAW, stage_times
+from tests.bench.stubs import KINDS, StubResult, fly_stub
+from tests.bench.swarms import swarm_file
 
-FTCC = [sys.executable, "-m", "ftcc.groundside.cli"]
-REPEATS = 3
-FLIGHT = 300.0
-"""s."""
-COPIES = 100
-"""Of an autopilot, so that the call from Python does not count."""
+Row = dict[str, Any]
+"""A line of a table: texts and numbers by the headings of their columns."""
+
+SIMULATED = 300.0
+"""Longest flight in one process, s."""
+FLOWN = 5.0
+"""Wall time that a flight with processes is to take, s."""
+SHORTEST, LONGEST = 5.0, 600.0
+"""Simulated time of a flight with processes, s."""
+SWARMS = (2, 8, 16, 60, 100, 200)
+"""UAVs; the smallest swarm is a follower and its leader."""
+MOST_UNPACKED = 100
+"""UAVs of the largest swarm that also flies with two processes each."""
+REAL_TIME = 60.0
+"""Flight by the wall clock, s."""
 
 
 def seconds(action: Callable[[], object]) -> float:
@@ -40,96 +58,35 @@ def seconds(action: Callable[[], object]) -> float:
     return time.perf_counter() - begun
 
 
-def median(action: Callable[[], object]) -> float:
+def median(action: Callable[[], object], repeats: int) -> float:
     """Median wall time of some runs after a first one that compiles and warms up, s."""
     action()
-    return statistics.median(seconds(action) for _ in range(REPEATS))
+    return statistics.median(seconds(action) for _ in range(repeats))
 
 
-def in_one_process(table: Table, folder: Path) -> None:
-    """Simulations of every shipped scenario, in its first form, for at most `FLIGHT`."""
-    for name in shipped():
-        length = min(FLIGHT, load(name).plan.duration)
-        mission = resolve(load(name, duration=length))
-        flown = median(partial(fly, mission))
-        recorded = median(partial(simulate_anew, mission, folder))
-        table.add_row(
-            f"simulate {name} {mission.form}, {len(mission.uavs)} vehicles, {length:g} s",
-            f"{flown:.2f} s, recorded {recorded:.2f} s",
-            f"{length / flown:.0f} x real time, recorded {length / recorded:.0f} x",
-        )
-
-
-def simulate_anew(mission: Mission, folder: Path) -> None:
-    """Simulate and record in a new folder."""
-    simulate(mission, Path(tempfile.mkdtemp(dir=folder)) / "run")
-
-
-def with_processes(table: Table, folder: Path) -> None:
-    """Flights in lockstep, a minute of containment each."""
-    for name, pack in (("16 processes", "1"), ("--pack auto", "auto")):
-        factors = []
-        for repeat in range(REPEATS):
-            run = subprocess.run(
-                [
-                    *FTCC, "fly", "containment", "--speed", "max", "--viewer", "none", "--duration", "60",
-                    "--pack", pack, "--out", str(folder / f"fly-{pack}-{repeat}"),
-                ],
-                capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": "200"},
-            )  # fmt: skip
-            line = next(line for line in run.stdout.splitlines() if "times real time" in line)
-            factors.append(float(line.split("(")[1].split()[0]))
-        table.add_row(
-            f"fly containment --speed max, {name}, 60 s",
-            f"{min(factors):.1f} .. {max(factors):.1f}",
-            f"median {statistics.median(factors):.1f} x real time",
-        )
-
-
-def start_up(table: Table, folder: Path) -> None:
-    """Whole commands whose flight takes next to nothing."""
-    flags = {"simulate": [], "fly": ["--speed", "max", "--viewer", "none"]}
-    for command, more in flags.items():
-        whole = median(partial(run_anew, [*FTCC, command, "containment", "--duration", "0.1", *more], folder))
-        table.add_row(f"ftcc {command} of 0.1 s, whole command", f"{whole:.2f} s", "")
-
-
-def run_anew(command: list[str], folder: Path) -> None:
-    """Run a command with a new run folder."""
-    subprocess.run([*command, "--out", f"{tempfile.mkdtemp(dir=folder)}/run"], capture_output=True, check=True)
-
-
-def law_step(scenario: str) -> float:
-    """Time of one control period of a follower amid a flight: inbox, reference, law, command; s."""
-    mission = resolve(load(scenario, duration=0.2))
-    flight = fly(mission)
-    now = {name: flight.column(name, mission.uavs[0])[-1] for name in flight.names}
-    autopilots, inbox = build(mission.autopilots[:1] * COPIES, mission.timing)
-    autopilots.own[:] = [now.get(name, 0.0) for name in Own._fields]
-    active, ok, controls = np.ones(COPIES, np.int64), np.ones(COPIES, np.int64), np.zeros((COPIES, 4))
-    law = tick_of(mission.scheme.name)
-    tick = partial(law.hear_and_control, autopilots, inbox, active, controls, ok, 0, mission.timing.period_us)
-    tick()
-    assert ok.all(), "a command that is not finite"
-    return statistics.median(seconds(tick) for _ in range(50)) / COPIES
-
-
-def laws(table: Table, folder: Path) -> None:
-    """One control period of every law, compiled and as plain Python."""
+def laws(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """One control period of every law: inbox, reference, law, command; compiled and as plain Python."""
     code = "import sys; from tests.bench.__main__ import law_step; print(*(law_step(name) for name in sys.argv[1:]))"
     names = list(one_scenario_per_scheme())
     measured = []
     for disable in ("0", "1"):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": disable}
         command = [sys.executable, "-c", code, *names]
-        run = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        run = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment)
         measured.append([float(word) for word in run.stdout.split()])
-    for name, compiled, plain in zip(names, *measured, strict=True):
-        table.add_row(
-            f"one control period of {load(name).plan.scheme}",
-            f"{1e6 * compiled:.2f} us, plain Python {1e6 * plain:.0f} us",
-            f"ratio {plain / compiled:.0f}",
-        )
+    return [
+        {"law": load(name).plan.scheme, "compiled, us": compiled, "plain Python, us": plain, "ratio": plain / compiled}
+        for name, compiled, plain in zip(names, *measured, strict=True)
+    ]
+
+
+def law_step(scenario: str) -> float:
+    """Time of one control period of a UAV amid a flight, us."""
+    plain = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+    mission = resolve(load(scenario, duration=20.0))
+    ticks = 20 if plain else 500
+    times = stage_times(mission, ticks, warm_up=5)
+    return sum(times[stage] for stage in LAW)
 
 
 def one_scenario_per_scheme() -> dict[str, str]:
@@ -137,17 +94,162 @@ def one_scenario_per_scheme() -> dict[str, str]:
     found: dict[str, str] = {}
     for name in shipped():
         scheme = load(name).plan.scheme
-        if scheme not in found.values():
+        if scheme not in found.values() and resolve(load(name, duration=1.0)).wire:
             found[name] = scheme
     return found
 
 
-def dashboard(table: Table, folder: Path) -> None:
+def stages(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """Each stage of a tick of containment, per UAV: all vehicles and autopilots in one process, in one thread."""
+    mission = resolve(load("containment", duration=30.0))
+    runs = [stage_times(mission) for _ in range(repeats)]
+    rows: list[Row] = [{"stage": name, "us": statistics.median(run[name] for run in runs)} for name in runs[0]]
+    return [*rows, {"stage": "all", "us": statistics.median(sum(run.values()) for run in runs)}]
+
+
+def in_one_process(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """Simulations of every shipped scenario, in its first form."""
+    rows = []
+    for name in shipped():
+        length = min(SIMULATED, load(name).plan.duration)
+        mission = resolve(load(name, duration=length))
+        flown = median(partial(simulate_in_memory, mission), repeats)
+        recorded = median(partial(simulate_anew, mission, folder), repeats)
+        rows.append(
+            {
+                "scenario": f"{name} {mission.form}",
+                "vehicles": len(mission.uavs),
+                "simulated, s": length,
+                "s": flown,
+                "x real time": length / flown,
+                "recorded, s": recorded,
+                "recorded, x real time": length / recorded,
+            }
+        )
+    return rows
+
+
+def simulate_anew(mission: Mission, folder: Path) -> None:
+    """Simulate and record in a new folder."""
+    simulate(mission, Path(tempfile.mkdtemp(dir=folder)) / "run")
+
+
+def with_processes(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """Swarms in lockstep, as fast as they can, beside stubs: as many pairs that only exchange a tick's datagrams.
+
+    Processor time is that of all processes of a kind, per pair of vehicle and autopilot and tick.
+    """
+    rows: list[Row] = []
+    for uavs in swarms:
+        scenario = swarm_file(folder, uavs, LONGEST)
+        ways = [("1", "none")] if uavs <= MOST_UNPACKED else []
+        ways += [("auto", "none")]
+        if uavs == 8:
+            ways.append(("1", "web"))
+        # The first flight compiles, and tells how long a flight must be.
+        lengths = [length_of(fly(scenario, uavs, *options(*way), duration=SHORTEST)) for way in ways]
+        flown: list[list[Flight]] = [[] for _ in ways]
+        stubs: dict[str, list[StubResult]] = {kind: [] for kind in KINDS}
+        for _ in range(repeats):
+            for kind, results in stubs.items():
+                results.append(fly_stub(kind, uavs))
+            for (pack, viewer), length, flights in zip(ways, lengths, flown, strict=True):
+                flights.append(fly(scenario, uavs, *options(pack, viewer), duration=length, viewer=viewer))
+        for kind, results in stubs.items():
+            rows.append(stub_row(uavs, kind, results))
+        reached = {kind: statistics.median(one.factor for one in results) for kind, results in stubs.items()}
+        for (pack, viewer), flights in zip(ways, flown, strict=True):
+            how = ("unpacked" if pack == "1" else "--pack auto") + (", web viewer" if viewer == "web" else "")
+            rows.append(flight_row(uavs, how, flights, reached))
+    return rows
+
+
+def options(pack: str, viewer: str) -> list[str]:
+    """Of ``ftcc fly``."""
+    return ["--speed", "max", "--pack", pack, "--mavlink", "none"]
+
+
+def length_of(tried: Flight) -> float:
+    """Simulated time of a flight that is to take `FLOWN` by the wall clock, s."""
+    factor = 1.0 if math.isnan(tried.factor) else tried.factor
+    return round(min(LONGEST, max(SHORTEST, FLOWN * factor)))
+
+
+def stub_row(uavs: int, kind: str, results: Sequence[StubResult]) -> Row:
+    """What a stub reached."""
+    factors = [one.factor for one in results]
+    return {
+        "swarm": uavs,
+        "what": f"{kind} stub",
+        "processes": 2 * uavs,
+        "x real time": statistics.median(factors),
+        "least": min(factors),
+        "most": max(factors),
+        "vehicle, us": statistics.median(one.vehicle_us for one in results),
+        "autopilot, us": statistics.median(one.autopilot_us for one in results),
+        "pair, us": statistics.median(one.pair_us for one in results),
+    }
+
+
+def flight_row(uavs: int, how: str, flights: Sequence[Flight], stubs: dict[str, float]) -> Row:
+    """What some flights of one kind reached."""
+    sound = [one for one in flights if not one.problem]
+    problems = [one.problem for one in flights if one.problem]
+    row: Row = {"swarm": uavs, "what": how, "processes": max(one.processes for one in flights)}
+    if problems:
+        row["problem"] = f"{len(problems)} of {len(flights)} flights failed: {problems[0]}"
+    if not sound:
+        return row
+    factors = [one.factor for one in sound]
+    row |= {"x real time": statistics.median(factors), "least": min(factors), "most": max(factors)}
+    row |= {f"of {kind} stub": f"{row['x real time'] / factor:.0%}" for kind, factor in stubs.items()}
+    measured = [one.cpu_us for one in sound if one.cpu_us]
+    for kind in measured[0] if measured else ():
+        used = statistics.median(one[kind] for one in measured)
+        if used > 0.0:
+            row[f"{kind}, us"] = used
+    if measured:
+        row["pair, us"] = row.get("vehicle, us", 0.0) + row.get("autopilot, us", 0.0)
+    return row
+
+
+def by_the_wall_clock(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """Late ticks where nobody waits for anybody, at real time."""
+    rows = []
+    for uavs, pack in ((16, "1"), (100, "auto")):
+        scenario = swarm_file(folder, uavs, REAL_TIME)
+        flags = ["--clock", "wall", "--speed", "1", "--pack", pack, "--mavlink", "none"]
+        flown = [fly(scenario, uavs, *flags, duration=REAL_TIME) for _ in range(repeats)]
+        row = flight_row(uavs, f"--clock wall, {'unpacked' if pack == '1' else '--pack auto'}", flown, {})
+        late = [one.late for one in flown if not one.problem]
+        if late:
+            row |= {"late": f"{statistics.median(late):.3%}", "at worst": f"{max(late):.3%}"}
+        rows.append(row)
+    return rows
+
+
+def start_up(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """Whole commands whose flight takes next to nothing."""
+    flags = {"simulate": [], "fly": ["--speed", "max", "--viewer", "none"]}
+    rows = []
+    for command, more in flags.items():
+        whole = [*FTCC, command, "containment", "--duration", "0.1", *more]
+        rows.append({"command": f"ftcc {command} of 0.1 s", "s": median(partial(run_anew, whole, folder), repeats)})
+    return rows
+
+
+def run_anew(command: list[str], folder: Path) -> None:
+    """Run a command with a new run folder."""
+    subprocess.run([*command, "--out", f"{tempfile.mkdtemp(dir=folder)}/run"], capture_output=True, check=True)
+
+
+def dashboard(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
     """What the ground process pays for a picture of eight UAVs, ten of which it draws in a second of wall time."""
     from ftcc.groundside.dashboard import Dashboard
     from tests.groundside.synthetic_swarm import SUBJECT, flight
 
     pictures = list(flight(30.0))
+    rows = []
     for viewer in ("none", "web"):
         recording = folder / f"{viewer}.rrd"
         shown = Dashboard(SUBJECT, recording=recording, viewer=viewer)  # type: ignore[arg-type]
@@ -160,21 +262,65 @@ def dashboard(table: Table, folder: Path) -> None:
         cost = (time.process_time() - begun) / (len(pictures) - 1)
         shown.close()
         size = recording.stat().st_size / len(pictures)
-        name = "recorded" + (" and in the web viewer" if viewer == "web" else "")
-        table.add_row(f"a picture of 8 UAVs, {name}", f"{1e3 * cost:.1f} ms", f"{1e3 * cost:.1f} % of a core at 10 Hz")
-        table.add_row("   in the recording", f"{size / 1e3:.1f} kB", f"{10.0 * size * 3600.0 / 1e6:.0f} MB an hour")
+        rows.append(
+            {
+                "a picture of 8 UAVs": "recorded" + (" and in the web viewer" if viewer == "web" else ""),
+                "ms": 1e3 * cost,
+                "of a core at 10 Hz": f"{10.0 * cost:.1%}",
+                "in the recording, kB": size / 1e3,
+                "MB an hour": 10.0 * size * 3600.0 / 1e6,
+            }
+        )
+    return rows
 
 
-PARTS = {"laws": laws, "simulate": in_one_process, "start": start_up, "fly": with_processes, "dashboard": dashboard}
+PARTS: dict[str, Callable[[int, Sequence[int], Path], list[Row]]] = {
+    "laws": laws,
+    "stages": stages,
+    "simulate": in_one_process,
+    "start": start_up,
+    "fly": with_processes,
+    "wall": by_the_wall_clock,
+    "dashboard": dashboard,
+}
+
+
+def shown(rows: Sequence[Row]) -> Table:
+    """Rows as a table: a column for each heading that any of them has."""
+    headings = list(dict.fromkeys(heading for row in rows for heading in row))
+    table = Table(*headings, box=None)
+    for row in rows:
+        table.add_row(*(f"{v:.4g}" if isinstance(v := row.get(heading, ""), float) else str(v) for heading in headings))
+    return table
 
 
 def main() -> None:
     """The benchmarks that are named on the command line, or all."""
-    table = Table("what", "measured", "", box=None)
-    with tempfile.TemporaryDirectory() as folder:
-        for part in sys.argv[1:] or PARTS:
-            PARTS[part](table, Path(folder))
-    Console(width=140).print(table)
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__.partition("\n")[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
+    parser.add_argument("--repeats", type=int, default=3, help="runs of each, of which medians are shown (3)")
+    parser.add_argument(
+        "--uavs", type=int, nargs="+", default=SWARMS, help=f"sizes of swarms to fly ({' '.join(map(str, SWARMS))})"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers there, too")
+    given = parser.parse_args()
+    unknown = set(given.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join(PARTS)}")
+    if given.repeats < 1 or not all(2 <= uavs <= 200 for uavs in given.uavs):
+        parser.error("repeats must be at least 1, and swarms have 2 to 200 UAVs")
+    console = Console(width=200)
+    results: dict[str, Any] = {
+        "machine": {"cores": usable_cores(), "processor": platform.processor(), "python": platform.python_version()}
+    }
+    with tempfile.TemporaryDirectory(prefix="ftcc-bench-") as folder:
+        for part in given.parts or PARTS:
+            rows = PARTS[part](given.repeats, given.uavs, Path(folder))
+            results[part] = rows
+            console.print(f"\n[bold]{part}[/]: {' '.join(str(PARTS[part].__doc__).split())}")
+            console.print(shown(rows))
+            if given.json:
+                given.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":
