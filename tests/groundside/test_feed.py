@@ -101,6 +101,27 @@ def test_a_watcher_that_does_not_read_costs_nothing_and_misses_no_event(feed: tu
     link.close()
 
 
+def test_nothing_is_encoded_for_a_watcher_that_does_not_read(
+    feed: tuple[Feed, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station, name = feed
+    link = stuck(name)
+    lines: list[bytes] = []
+
+    def counted(snap: Snapshot) -> bytes:
+        lines.append(encoded(snap))
+        return lines[-1]
+
+    monkeypatch.setattr(feed_module, "encoded", counted)
+    for t in range(500):
+        station.offer(snapshot(float(t)))
+    room = len(lines)
+    for t in range(500):
+        station.offer(snapshot(float(t)))
+    assert len(lines) == room < 500
+    link.close()
+
+
 def test_a_watcher_that_dies_is_forgotten(feed: tuple[Feed, str]) -> None:
     station, name = feed
     stuck(name).close()
