@@ -31,6 +31,8 @@ _SHORTEST = 0.5
 """Below it there is no factor yet, s."""
 _HELD = 0.97
 """Share of the factor asked for from which on it counts as held."""
+_OLD = 0.1
+"""By how much older the simulated time of one sample may be than that of another: it comes with telemetry, wall s."""
 _FULL = 0.9
 """Share of all cores from which on the machine is full."""
 _FOREIGN = 0.2
@@ -127,7 +129,7 @@ def judge(earlier: Sample, later: Sample, setup: Setup) -> Pace:
     """The pace between two samples, and what limited it."""
     wall = later.wall - earlier.wall
     factor = (later.t - earlier.t) / wall
-    if setup.asked is not None and factor >= _HELD * setup.asked:
+    if setup.asked is not None and factor * wall >= _HELD * setup.asked * (wall - _OLD):
         return Pace(factor, setup.asked)
     of = loads(earlier, later)
     by_kind = {kind: sum(load for one, load in of.items() if one.kind == kind) for kind in get_args(Kind)}

@@ -49,6 +49,12 @@ def test_a_factor_that_is_held_has_no_limit():
     assert held == Pace(pytest.approx(0.98), 1.0)
 
 
+def test_news_that_come_late_do_not_look_like_a_speed_that_is_not_held():
+    before = Sample(0.0, 10.0, {STATION: 0.0}, 0.0)
+    assert judge(before, Sample(1.0, 10.9, {STATION: 0.1}, 0.2), setup(asked=1.0)).limit == ""
+    assert judge(before, Sample(5.0, 14.5, {STATION: 0.1}, 0.2), setup(asked=1.0)).limit != ""
+
+
 def test_a_full_machine_names_who_uses_most():
     full = pace(40.0, swarm(8, 0.07, 0.15) | {STATION: 0.14}, setup())
     assert full.factor == pytest.approx(8.0)
