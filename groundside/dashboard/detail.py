@@ -45,7 +45,7 @@ class Detail:
             room, followers = FULL - TROUBLED - len(leaders), subject.followers
             spread = {len(followers) * i // room for i in range(room)}
             self.shown = sorted([*(uav for i, uav in enumerate(followers) if i in spread), *leaders])
-        self._known = set(self.shown)
+        self._others = set(uavs) - set(self.shown)
 
     def follow(self, snapshot: Snapshot) -> list[int]:
         """Take UAVs into view that have got into trouble, as long as there is room; those that are new."""
@@ -53,9 +53,9 @@ class Detail:
         if not self.crowded or len(self.shown) >= self.room:
             return new
         for uav, state in snapshot.uavs.items():
-            if uav not in self._known and in_trouble(state, snapshot):
+            if uav in self._others and in_trouble(state, snapshot):
                 new.append(uav)
-                self._known.add(uav)
+                self._others.remove(uav)
                 self.shown.append(uav)
                 if len(self.shown) >= self.room:
                     break
