@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Finding", "Prediction", "examine", "machine", "predict", "verdict"]
 
-_MEASURED = 4.0
-"""Wall time of a flight to measure, s."""
+_MEASURED = 3.5
+"""Wall time over which a flight is measured, s."""
 _SETTLED = 0.7
 """Wall time after which everybody has found its pace, s."""
 _BETWEEN = 0.25
@@ -78,7 +78,7 @@ def examine(
     Parameters
     ----------
     speed : times real time that are wanted; inf: whatever can be had.
-    seconds : wall time for which either is flown, after its start.
+    seconds : wall time over which either is measured, after its start.
     progress : called with what is done at the moment, which may take a minute.
     """
     from ftcc.groundside.launcher import automatic_pack
@@ -187,17 +187,17 @@ class _Watch:
         if not self.processes:
             self.processes = processes_of(self.folder, os.getpid())
             self.memory = _memory()
-            now = time.monotonic()
+            return  # that took its time: ``t`` is old
         if not self.samples or now - self.samples[-1].wall >= _BETWEEN:
             self.samples.append(self.meter.sample(now, t, self.processes, [], os.getpid()))
-        if now - self.begun >= self.seconds:
+        if now - self.samples[0].wall >= self.seconds:
             self.enough = True
             # From a thread of its own: the one that flies has to answer.
             threading.Thread(target=_stop, args=(self.folder.name,), daemon=True).start()
 
 
 def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Prediction:
-    """Fly ``mission`` for some ``seconds`` of wall time and tell how a whole flight would go.
+    """Fly ``mission``, look at it for some ``seconds`` of wall time, and tell how a whole flight would go.
 
     Raises
     ------

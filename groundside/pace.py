@@ -39,6 +39,10 @@ _FOREIGN = 0.2
 """Share of all cores from which on other programs are to blame for that."""
 _SATURATED = 0.85
 """Share of one core from which on a process has no time left."""
+_IN_TURN = 1.1
+"""Cores that a vehicle and an autopilot process use together at most, if only one of them works at a time."""
+_ROOM = 0.9
+"""Idle cores from which on more processes would find one."""
 _NOTICEABLE = 0.05
 """Share of all cores from which on leaving something out helps."""
 
@@ -171,28 +175,30 @@ def _alone(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[
     flying = {one: load for one, load in of.items() if one.kind in ("vehicle", "autopilot")}
     if not flying:
         return None
-    idle = f"while {setup.cores - everybody:.1f} of {setup.cores} cores idle"
+    idle = setup.cores - everybody
+    idling = f"while {idle:.1f} of {setup.cores} cores idle"
     busiest = max(flying, key=lambda one: flying[one])
     groups: dict[str, float] = {}
     for one, load in flying.items():
         groups[one.group] = groups.get(one.group, 0.0) + load
     fullest = max(groups, key=lambda group: groups[group])
     if flying[busiest] >= _SATURATED:
-        limit = f"{busiest.name} alone fills a core ({flying[busiest]:.0%}) {idle}"
-    elif groups[fullest] >= _SATURATED and setup.pack > 1:
-        limit = f"vehicles and autopilots of {fullest} take turns on one core ({groups[fullest]:.0%}) {idle}"
+        limit = f"{busiest.name} alone fills a core ({flying[busiest]:.0%}) {idling}"
+    elif setup.pack > 1 and _SATURATED <= groups[fullest] <= _IN_TURN:
+        limit = f"vehicles and autopilots of {fullest} take turns on one core ({groups[fullest]:.0%}) {idling}"
     else:
         return None
     if setup.pack == 1:
         return limit, ["a faster core: one UAV cannot be spread over several"]
-    smaller = max(1, setup.pack // 2)
-    return limit, [f"--pack {smaller}: smaller packs use more cores"]
+    if idle < _ROOM:
+        return limit, []
+    return limit, [f"--pack {setup.pack // 2}: smaller packs use more cores"]
 
 
 def _waiting(by_kind: Mapping[Kind, float], everybody: float, setup: Setup) -> tuple[str, list[str]]:
     """Cores idle and nobody is short of one."""
     own = sum(by_kind.values())
-    limit = f"nobody is busy: the swarm uses {own:.1f} of {setup.cores} cores and waits for messages between processes"
+    limit = f"processes wait for each other's messages: the swarm uses {own:.1f} of {setup.cores} cores"
     return limit, ["--pack auto: fewer processes wait for each other"] if setup.pack < setup.automatic else []
 
 

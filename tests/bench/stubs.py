@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import multiprocessing
 import resource
+import signal
 import socket
 import time
 from collections.abc import Callable
@@ -23,6 +24,8 @@ __all__ = ["KINDS", "StubResult", "fly_stub"]
 
 CONTROL_RATE = 100.0
 """Ticks in a simulated second."""
+_TRIED = 500
+"""Ticks after which it is known how many make a measurement."""
 _PATIENCE = 120.0
 """Wall time for anything, s."""
 _UNUSED = (0.0,) * 12
@@ -106,6 +109,7 @@ KINDS: dict[str, tuple[Callable[[socket.socket, int], int], Callable[[socket.soc
 
 def _member(fly: Callable[[socket.socket, int], int], warm_up: int, ticks: int, parent: Connection) -> None:
     """Body of a stub process: its port to the parent, its peer's from it, then a short and the measured exchange."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.bind(("127.0.0.1", 0))
         parent.send(link.getsockname()[1])
@@ -171,5 +175,6 @@ def _run(kind: str, pairs: int, ticks: int) -> StubResult:
 
 def fly_stub(kind: str, pairs: int, seconds: float = 3.0) -> StubResult:
     """Fly ``pairs`` of stub processes of a kind of `KINDS` for about ``seconds`` of wall time."""
-    tried = _run(kind, pairs, 500)
-    return _run(kind, pairs, max(500, round(tried.factor * CONTROL_RATE * seconds)))
+    tried = _run(kind, pairs, _TRIED)
+    ticks = round(tried.factor * CONTROL_RATE * seconds)
+    return _run(kind, pairs, ticks) if ticks > _TRIED else tried
