@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,6 +34,10 @@ _MEASURED = 3.5
 """Wall time over which a flight is measured, s."""
 _SETTLED = 0.7
 """Wall time after which everybody has found its pace, s."""
+_LEAST_MEASURED = 1.0
+"""Wall time that is enough where a scenario is over sooner, s."""
+_LONGEST = 36_000.0
+"""Simulated time to which a short scenario is extended, so that it lasts until it is stopped, s."""
 _BETWEEN = 0.25
 """Wall time between two samples, s."""
 _RESERVE = 1.15
@@ -161,6 +165,8 @@ class _Watch:
     folder: Path
     meter: PaceMeter
     seconds: float
+    duration: float
+    """Of the scenario, simulated s."""
     created: float = field(default_factory=time.monotonic)
     begun: float = math.inf
     """When everybody was ready (wall s, monotonic)."""
@@ -176,7 +182,7 @@ class _Watch:
 
     def hear(self, event: Event) -> None:
         """Something happened."""
-        if event.severity == "error":
+        if event.severity == "error" and event.t <= self.duration:
             self.problems.append(event.text.splitlines()[0])
 
     def progress(self, t: float) -> None:
@@ -190,7 +196,7 @@ class _Watch:
             return  # that took its time: ``t`` is old
         if not self.samples or now - self.samples[-1].wall >= _BETWEEN:
             self.samples.append(self.meter.sample(now, t, self.processes, [], os.getpid()))
-        if now - self.samples[0].wall >= self.seconds:
+        if now - self.samples[0].wall >= (self.seconds if t <= self.duration else _LEAST_MEASURED):
             self.enough = True
             # From a thread of its own: the one that flies has to answer.
             threading.Thread(target=_stop, args=(self.folder.name,), daemon=True).start()
@@ -211,11 +217,13 @@ def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Predicti
     setup = Setup(None, len(uavs), pack, automatic_pack(len(uavs)), usable_cores())
     with tempfile.TemporaryDirectory(prefix="ftcc-doctor-") as room:
         folder = Path(room)
-        watch = _Watch(folder, PaceMeter(setup), seconds)
+        watch = _Watch(folder, PaceMeter(setup), seconds, mission.timing.duration)
+        ticks = round(_LONGEST / mission.timing.period)
+        lasting = replace(mission, timing=mission.timing._replace(ticks=max(ticks, mission.timing.ticks)))
         options = FlightOptions(folder, lockstep=True, speed=math.inf, pack=pack, listeners=_NOBODY)
         processes = 2 * -(-len(uavs) // pack)
         try:
-            outcome = fly(mission, options, reserve(uavs), watch.hear, watch.progress, watch.started)
+            outcome = fly(lasting, options, reserve(uavs), watch.hear, watch.progress, watch.started)
         except (TimeoutError, PortError) as error:
             return Prediction(pack, processes, Pace(math.nan, None), 0.0, math.nan, str(error))
     if outcome.stopped and not watch.enough:
@@ -223,7 +231,7 @@ def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Predicti
     pace = Pace(math.nan, None)
     if len(watch.samples) > 1:
         pace = judge(watch.samples[0], watch.samples[-1], setup)
-    problem = "" if outcome.ok else "; ".join(watch.problems)
+    problem = "; ".join(watch.problems)
     return Prediction(pack, processes, pace, watch.memory, watch.begun - watch.created, problem)
 
 
