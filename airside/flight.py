@@ -14,7 +14,7 @@ from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, WRITE
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import report_link
-from ftcc.link.compiled import compiled, compiled_to_wait, copy
+from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within, copy
 from ftcc.link.exchange import append, begin
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
@@ -32,17 +32,13 @@ from ftcc.link.wire import (
     send_position_target,
 )
 
-__all__ = ["fly_freely", "fly_in_lockstep", "take"]
+__all__ = ["fly", "take", "tick"]
 
 if "stages" not in globals():
     raise ImportError("ftcc.airside.flight is a template: use ftcc.airside.group.flight_of(scheme)")
 
 stages: Any = globals()["stages"]
 
-_sense = stages.sense
-_hear = stages.hear
-_refer = stages.refer
-_control = stages.control
 _tell = stages.tell
 
 _DATAGRAMS = 64
@@ -53,7 +49,27 @@ _AHEAD = 4
 """Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
 
 
-@compiled
+@compiled_apart
+def _sense(autopilots, i, state, reported, now_us):
+    stages.sense(autopilots, i, state, reported, now_us)
+
+
+@compiled_apart
+def _hear(exchange, inbox, events, timing, i, now_us):
+    stages.hear(exchange, inbox, events, timing, i, now_us)
+
+
+@compiled_apart
+def _refer(autopilots, inbox, i, now_us, period_us):
+    stages.refer(autopilots, inbox, i, now_us, period_us)
+
+
+@compiled_apart
+def _control(autopilots, inbox, i, dt):
+    return stages.control(autopilots, inbox, i, dt)
+
+
+@compiled_within
 def tick(group, timing, now_us):
     """One tick of the autopilots that are ``active``."""
     every = range(group.active.shape[0])
@@ -67,15 +83,21 @@ def tick(group, timing, now_us):
             refer(group, timing, i, now_us)
             control(group, timing, i, now_us)
             actuate(group, i, now_us)
-    for i in every:
-        if group.active[i] == 1 and now_us % timing.exchange_us == 0:
-            tell(group, timing, i, now_us)
+    if now_us % timing.exchange_us == 0:
+        if group.linked[0] == 1:
+            # Those who hear nobody's record in it hear how far this process has heard.
+            begin(
+                group.transmission, now_us // timing.exchange_us, group.complete[0], 0, group.autopilots.shared.shape[1]
+            )
+        for i in every:
+            if group.active[i] == 1:
+                tell(group, timing, i, now_us)
     for i in every:
         if group.active[i] == 1:
             report(group, timing, i, now_us)
 
 
-@compiled
+@compiled_within
 def sense(group, i, now_us):
     """The state that has come becomes the present one.
 
@@ -87,19 +109,19 @@ def sense(group, i, now_us):
     _sense(group.autopilots, i, group.states[i], group.reported[i], now_us)
 
 
-@compiled
+@compiled_within
 def hear(group, timing, i, now_us):
     """The records that are due, through the channel into the inbox."""
     _hear(group.exchange, group.inbox, group.events, timing, i, now_us)
 
 
-@compiled
+@compiled_within
 def refer(group, timing, i, now_us):
     """What is tracked: a leader's profile, a follower's own reference."""
     _refer(group.autopilots, group.inbox, i, now_us, timing.period_us)
 
 
-@compiled
+@compiled_within
 def control(group, timing, i, now_us):
     """The law; a UAV whose command is not finite ends here."""
     group.done[i] = now_us // timing.period_us
@@ -114,7 +136,7 @@ def control(group, timing, i, now_us):
         group.given_up[0] += 1
 
 
-@compiled
+@compiled_within
 def actuate(group, i, now_us):
     """The command to the vehicle."""
     if group.active[i] == 0:
@@ -131,20 +153,18 @@ def actuate(group, i, now_us):
         group.unsendable[0] = 1
 
 
-@compiled
+@compiled_within
 def tell(group, timing, i, now_us):
     """A record for the neighbours: here those in this process, with the next transmission the others."""
     sequence = now_us // timing.exchange_us
     _tell(group.autopilots, group.exchange, group.events, i, sequence, now_us)
     if group.heard_outside[i] == 1:
-        if group.transmission.used[0] == 0:
-            begin(group.transmission, sequence, group.complete[0], 0, group.autopilots.shared.shape[1])
         uav, radio_on = group.wire.system[i], group.events.radio_on[i]
         if not append(group.transmission, uav, sequence, now_us, radio_on, group.autopilots.shared[i]):
             group.unsendable[0] = 1
 
 
-@compiled
+@compiled_within
 def report(group, timing, i, now_us):
     """A row of the recording, and one on each in-edge, where they are due."""
     n = now_us // timing.period_us
@@ -163,7 +183,7 @@ def report(group, timing, i, now_us):
             links.filled[i] += 1
 
 
-@compiled
+@compiled_within
 def something_to_do(group, now_us):
     """Whether Python has something to do after this tick; what, says ``to_do``."""
     to_do = 0
@@ -184,7 +204,7 @@ def something_to_do(group, now_us):
 # Waiting for what a tick needs.
 
 
-@compiled
+@compiled_within
 def take(group, timing, i):
     """Take in the datagram at hand for UAV ``i``; one that was answered already is answered once more."""
     stamp, told = read_state(group.wire, group.arrived[i], group.arrived_controls[i])
@@ -198,7 +218,7 @@ def take(group, timing, i):
     return GO_ON
 
 
-@compiled
+@compiled_within
 def listen(group, timing):
     """Read what the vehicles sent, until each has a state."""
     for i in range(group.alive.shape[0]):
@@ -211,45 +231,18 @@ def listen(group, timing):
     return GO_ON
 
 
-@compiled
-def _look_around(group, first):
-    """Wait for the descriptors from row ``first`` of ``polled`` on; the cause if it is time for Python to look."""
-    wait(group.wire.polled[first:], _LOOK)
-    others = group.alive.shape[0]
-    if is_readable(group.wire, others) or monotonic(group.room) >= group.attention[0]:
-        return ATTEND
-    return GO_ON
+@compiled_within
+def ask_again(group, now):
+    """Lockstep: send commands again where the next state does not come: a datagram may be lost."""
+    if now - group.since[0] < RESEND:
+        return
+    group.since[0] = now
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.pending[i] < 0:
+            send_again(group.wire, i)
 
 
-@compiled
-def _await_states(group, timing):
-    """Lockstep: wait until every living UAV has its state."""
-    while True:
-        cause = listen(group, timing)
-        if cause != GO_ON:
-            return cause
-        missing = 0
-        for i in range(group.alive.shape[0]):
-            if group.alive[i] == 1 and group.pending[i] < 0:
-                missing += 1
-        if missing == 0:
-            return GO_ON
-        now = monotonic(group.room)
-        if now - group.since[0] > RESEND:
-            group.since[0] = now
-            for i in range(group.alive.shape[0]):
-                if group.alive[i] == 1 and group.pending[i] < 0:
-                    send_again(group.wire, i)
-        mesh = group.alive.shape[0] + 1
-        descriptor = group.wire.polled[mesh, 0]
-        group.wire.polled[mesh, 0] = -1
-        cause = _look_around(group, 0)
-        group.wire.polled[mesh, 0] = descriptor
-        if cause != GO_ON:
-            return cause
-
-
-@compiled
+@compiled_within
 def records_are_here(group, timing, now_us):
     """Lockstep: whether every record that could be usable is here, and nobody who hears this process is far behind."""
     due = now_us - timing.latency_us
@@ -259,20 +252,17 @@ def records_are_here(group, timing, now_us):
     return now_us % timing.exchange_us != 0 or group.acknowledged[0] >= now_us // timing.exchange_us - window
 
 
-@compiled
-def _await_records(group, timing, now_us):
-    """Lockstep: sleep until the mesh has brought what this tick needs."""
-    if records_are_here(group, timing, now_us):
-        return GO_ON
-    if group.mail[0] == 0:
-        others = group.alive.shape[0]
-        cause = _look_around(group, others)
-        if cause != GO_ON:
-            return cause
-    return MAIL
+@compiled_within
+def _missing_states(group):
+    """How many of those who are alive have no state yet."""
+    missing = 0
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.pending[i] < 0:
+            missing += 1
+    return missing
 
 
-@compiled
+@compiled_within
 def _next_state(group):
     """The earliest tick of which a state has come; -1: none."""
     earliest = -1
@@ -282,7 +272,7 @@ def _next_state(group):
     return earliest
 
 
-@compiled
+@compiled_within
 def is_over(group, timing):
     """Whether all who are alive have flown their last tick."""
     flying = 0
@@ -292,7 +282,7 @@ def is_over(group, timing):
     return flying == 0
 
 
-@compiled
+@compiled_within
 def _fly_tick(group, timing, n):
     """Fly tick ``n`` of those whose state of it is here; whether Python has something to do then."""
     for i in range(group.alive.shape[0]):
@@ -302,43 +292,46 @@ def _fly_tick(group, timing, n):
 
 
 @compiled_to_wait
-def fly_in_lockstep(group, timing):
-    """Fly tick after tick, all at once, until Python has something to do; why, see `link.waiting`."""
+def fly(group, timing, lockstep):
+    """Fly tick after tick until Python has something to do; why, see `link.waiting`.
+
+    In lockstep a tick waits for the states of all and for every record that could be usable; otherwise it is flown for
+    those whose state has come, with the newest records.
+    """
+    wire, others = group.wire, group.alive.shape[0]
+    mesh = others + 1
     while True:
         if is_over(group, timing):
             return FLOWN
-        if monotonic(group.room) >= group.attention[0]:
-            return ATTEND
-        cause = _await_states(group, timing)
-        if cause != GO_ON:
-            return cause
-        n = _next_state(group)
-        cause = _await_records(group, timing, n * timing.period_us)
-        if cause != GO_ON:
-            return cause
-        work = _fly_tick(group, timing, n)
-        group.since[0] = monotonic(group.room)
-        if work:
-            return WORK
-
-
-@compiled_to_wait
-def fly_freely(group, timing):
-    """Work on the states of each vehicle as they come, with the newest records, until Python has something to do."""
-    while True:
-        if is_over(group, timing):
-            return FLOWN
-        if monotonic(group.room) >= group.attention[0]:
-            return ATTEND
         cause = listen(group, timing)
         if cause != GO_ON:
             return cause
-        if group.mail[0] == 1:
-            return MAIL
+        now = monotonic(group.room)
+        if now >= group.attention[0]:
+            return ATTEND
         n = _next_state(group)
-        if n < 0:
-            cause = _look_around(group, 0)
-            if cause != GO_ON:
-                return cause
-        elif _fly_tick(group, timing, n):
-            return WORK
+        ready = n >= 0 and not (lockstep and _missing_states(group) > 0)
+        records = not lockstep or (ready and records_are_here(group, timing, n * timing.period_us))
+        if group.mail[0] == 1 and ready and not (lockstep and records):
+            return MAIL
+        if ready and records:
+            work = _fly_tick(group, timing, n)
+            group.since[0] = now
+            if work:
+                return WORK
+            continue
+        if ready:
+            # Only the mesh is waited for, and what is always heard.
+            wait(wire.polled[others:], _LOOK)
+            if is_readable(wire, mesh):
+                return MAIL
+        else:
+            # A record that comes early wakes nobody up.
+            if lockstep:
+                ask_again(group, now)
+            descriptor = wire.polled[mesh, 0]
+            wire.polled[mesh, 0] = -1
+            wait(wire.polled, _LOOK)
+            wire.polled[mesh, 0] = descriptor
+        if is_readable(wire, others):
+            return ATTEND

@@ -34,6 +34,7 @@ def flight_of(scheme: str) -> ModuleType:
         uncompile([flight])
     return flight
 
+
 PUBLISH, WRITE, NOTE, GIVE_UP, REPORT = 1, 2, 4, 8, 16
 """What there may be to do after a tick: a transmission for the mesh, full rows, events, a UAV that ends, telemetry."""
 
@@ -46,7 +47,7 @@ class AutopilotGroup(NamedTuple):
     events: LinkEvents
     exchange: Exchange
     transmission: Transmission
-    """What goes to other processes after an exchange; empty if nobody there hears these UAVs."""
+    """What goes to other processes after an exchange."""
     wire: Wire
     rows: Rows
     """Of the recording; leaders fill none."""
@@ -56,6 +57,8 @@ class AutopilotGroup(NamedTuple):
     """(k,): 0 once a UAV has ended."""
     active: NDArray[np.int64]
     """(k,): 1 for those that take part in this tick."""
+    linked: NDArray[np.int64]
+    """(1,): 1 where the process puts transmissions on the mesh."""
     heard_outside: NDArray[np.int64]
     """(k,): 1 for those that UAVs of other processes hear."""
     travels_by: NDArray[np.int64]
@@ -126,6 +129,7 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
         link_rows=link_rows,
         alive=np.ones(k, np.int64),
         active=np.zeros(k, np.int64),
+        linked=np.zeros(1, np.int64),
         heard_outside=np.array([bool(set(spec.hearers) - set(own)) for spec in specs], np.int64),
         travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
         pending=np.full(k, -1, np.int64),

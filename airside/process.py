@@ -61,8 +61,7 @@ def load_compiled(group: AutopilotGroup, timing: Timing, flight: ModuleType) -> 
     """Load, or compile, the flight of a group before it begins."""
     alive = group.alive.copy()
     group.alive[:] = 0
-    flight.fly_in_lockstep(group, timing)
-    flight.fly_freely(group, timing)
+    flight.fly(group, timing, True)
     flight.take(group, timing, 0)
     group.alive[:] = alive
 
@@ -98,7 +97,9 @@ class Crew:
         for link in self.ground:
             for socket in link.sockets:
                 self.waiter.add(socket, partial(link.listen, socket))
-        connect(self.group.wire, self.vehicles, self.waiter.fileno(), self.neighbourhood.fileno())
+        # In real time nobody waits for records: what has come is taken before the next tick.
+        mesh = self.neighbourhood.fileno() if setting.lockstep else -1
+        connect(self.group.wire, self.vehicles, self.waiter.fileno(), mesh)
         self.stall = Stall()
 
     def seat(self, i: int) -> Seat:
@@ -128,7 +129,6 @@ class Crew:
 
     def fly(self) -> None:
         """All ticks, or until everybody is lost or the launcher stops the flight."""
-        fly = self.flight.fly_in_lockstep if self.setting.lockstep else self.flight.fly_freely
         cause = ATTEND
         while cause != FLOWN:
             if cause == DATAGRAM:
@@ -141,7 +141,7 @@ class Crew:
                 self.attend()
             if self.gate.stopping:
                 break
-            cause = fly(self.group, self.timing)
+            cause = self.flight.fly(self.group, self.timing, self.setting.lockstep)
         self.end()
 
     # What is to be done after a tick.

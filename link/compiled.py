@@ -29,7 +29,9 @@ __all__ = [
     "Vector",
     "cache_folder",
     "compiled",
+    "compiled_apart",
     "compiled_to_wait",
+    "compiled_within",
     "copy",
     "external",
     "fields",
@@ -64,6 +66,23 @@ def compiled(function: F) -> F:
     return _compiled(function)
 
 
+def compiled_apart(function: F) -> F:
+    """As `compiled`, for a large function that is called from large ones: it is not copied into each of them.
+
+    Every compiled function is optimized with all that it contains: without such borders, the whole flight of a process
+    would be optimized anew at each level of its functions.
+    """
+    return _compiled(function, forceinline=False)
+
+
+def compiled_within(function: F) -> F:
+    """As `compiled`, for a step of one long function: it becomes part of its caller before that is compiled.
+
+    So it may take arguments of very many arrays, which cost seconds at each border between compiled functions.
+    """
+    return _compiled(function, inline="always")
+
+
 def compiled_to_wait(function: F) -> F:
     """As `compiled`, for a function that waits for sockets: other threads of Python run meanwhile."""
     return _compiled(function, nogil=True)
@@ -72,7 +91,8 @@ def compiled_to_wait(function: F) -> F:
 def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
-    return numba.njit(cache=True, error_model="numpy", forceinline=True, _nrt=False, **options)(function)  # type: ignore[no-any-return]
+    settings = {"cache": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
+    return numba.njit(**settings)(function)  # type: ignore[no-any-return]
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.codec import dialect
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, compiled_apart
 
 __all__ = [
     "ACTUATORS",
@@ -187,7 +187,7 @@ def _finite(octets, shape):
     )
 
 
-@compiled
+@compiled_apart
 def write_frame(payload, shape, system, component, sequence, out, at):
     """Write a message with the layout ``shape`` into the datagram ``out`` from byte ``at`` on; where it ends.
 
@@ -217,7 +217,7 @@ def write_frame(payload, shape, system, component, sequence, out, at):
     return end + _CHECKSUM
 
 
-@compiled
+@compiled_apart
 def read_frame(data, at, end, payload):
     """Read the frame at byte ``at`` of a datagram of ``end`` bytes into ``payload``.
 

@@ -8,6 +8,7 @@ so a process sleeps until it arrives, on the mesh and on its sockets at once.
 from __future__ import annotations
 
 import collections
+import contextlib
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -22,6 +23,8 @@ __all__ = ["Mesh"]
 _RING = 16
 """Transmissions kept of each sender in real time."""
 
+_RINGS = 64
+"""Bytes in the pipe, at most: there are one or two."""
 _RUNTIME = "(" + ", ".join(f"{pool}: (handover: app)" for pool in ("acc", "rx", "tx", "net")) + ")"
 """One thread of Zenoh's for all its work: handing a record from one to the other costs more than sending it."""
 
@@ -91,9 +94,8 @@ class Mesh:
             arrived.append(bytes(sample.payload))
             self.mail[0] = 1
             if not self._rung:
-                # In this order: where it says that the bell was rung, there is something to read.
-                os.write(self._button, b".")
                 self._rung = True
+                os.write(self._button, b".")
 
         return keep
 
@@ -121,10 +123,11 @@ class Mesh:
 
     def receive(self) -> list[tuple[int, bytes]]:
         """The transmissions that have arrived since the last call, with their senders; those of one in order."""
-        if self._rung:
-            # In this order: what arrives after this rings again.
-            os.read(self._bell, 1)
-            self._rung = False
+        # In this order: what arrives after this rings again. Zenoh's thread may be about to write: then there is nothing
+        # to read yet, and the bell rings once in vain.
+        self._rung = False
+        with contextlib.suppress(BlockingIOError):
+            os.read(self._bell, _RINGS)
         self.mail[0] = 0
         received = []
         for sender, arrived in self._arrived.items():

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.codec import Codec, dialect
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, compiled_apart
 from ftcc.link.frames import (
     ACTUATORS,
     ATTITUDE,
@@ -236,7 +236,7 @@ def _put_command(wire, stamp_us, controls):
         wire.payload.floats[_CONTROLS + n] = controls[n]
 
 
-@compiled
+@compiled_apart
 def send_state(wire, i, stamp_us, state, controls, with_controls):
     """Send the state (13,), see `STATE`, and, where asked for, the command in force (4,), as fractions of travel.
 
@@ -261,14 +261,14 @@ def send_state(wire, i, stamp_us, state, controls, with_controls):
     return _send(wire, i, end)
 
 
-@compiled
+@compiled_apart
 def send_command(wire, i, stamp_us, controls):
     """Send an actuator command (4,), as fractions of travel, that answers the state of that stamp."""
     _put_command(wire, stamp_us, controls)
     return _send(wire, i, _append(wire, i, ACTUATORS, 0))
 
 
-@compiled
+@compiled_apart
 def send_attitude_target(wire, i, stamp_us, target):
     """Send an attitude target (5,), see ``attitude_target.TARGET``, that answers the state of that stamp."""
     payload = wire.payload
@@ -283,7 +283,7 @@ def send_attitude_target(wire, i, stamp_us, target):
     return _send(wire, i, _append(wire, i, ATTITUDE_TARGET, 0))
 
 
-@compiled
+@compiled_apart
 def send_position_target(wire, i, target):
     """Send a leader's target (stamp s, x, y, z, vx, vy, vz; z up) to its reference point; z is down on the wire."""
     payload = wire.payload
@@ -302,7 +302,7 @@ def send_position_target(wire, i, target):
     return _send(wire, i, _append(wire, i, POSITION_TARGET, 0))
 
 
-@compiled
+@compiled_apart
 def read_state(wire, state, controls):
     """The state in the datagram at hand.
 
@@ -342,7 +342,7 @@ def _read_alone(wire, shape):
     return number == shape.number and at == wire.length[0]
 
 
-@compiled
+@compiled_apart
 def read_command(wire, controls):
     """The actuator command in the datagram at hand: its stamp in us, or -1 if it is anything else."""
     if not _read_alone(wire, ACTUATORS):
@@ -352,7 +352,7 @@ def read_command(wire, controls):
     return wire.payload.longs[0]
 
 
-@compiled
+@compiled_apart
 def read_attitude_target(wire, target):
     """The attitude target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
     if not _read_alone(wire, ATTITUDE_TARGET):
@@ -363,7 +363,7 @@ def read_attitude_target(wire, target):
     return np.int64(wire.payload.words[0]) * 1000
 
 
-@compiled
+@compiled_apart
 def read_position_target(wire, target):
     """The leader's target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
     if not _read_alone(wire, POSITION_TARGET):

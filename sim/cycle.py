@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
-from ftcc.link.compiled import compiled, fields, fill, moved
+from ftcc.link.compiled import compiled, compiled_within, fields, fill, moved
 from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
@@ -38,7 +38,7 @@ _CHANNELS = len(plant.DISTURBANCES)
 _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
 
 
-@compiled
+@compiled_within
 def _hold_speed(fleet, i):
     if fleet.autothrottle[i, 0] > 0.0:
         hold_speed(fleet, i, _airspeed(fields(_State, fleet.state[i])))
@@ -51,7 +51,7 @@ def actuate(fleet, i, time):
     plant_actuate(fleet, i, time)
 
 
-@compiled
+@compiled_within
 def _stroke(fleet, i, slot, time, step):
     if slot in _SLOTS:  # known when compiled
         return stroke(fleet, i, slot, time, step)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ftcc.link.actuators import decode_command
 from ftcc.link.attitude_target import decode_target, path_of
-from ftcc.link.compiled import compiled, compiled_to_wait, copy
+from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within, copy
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, pause, wait
@@ -37,30 +37,40 @@ if "cycle" not in globals():
 
 cycle: Any = globals()["cycle"]
 
-_sense = cycle.sense
-_advance = cycle.advance
 _conditions = cycle.conditions
 
 _DATAGRAMS = 64
 """Read of one autopilot at a time, at most: a flood must not hold up a tick for ever."""
 _LOOK = 20
 """Longest wait before the clock is looked at, ms."""
+_SHORT = 1e-3
+"""Waits below it are slept, s: `wait` knows whole milliseconds."""
 _BEHIND = 0.1
 """What a swarm in lockstep may be behind its pace and catch up, wall s: beyond it, simulated time is slower."""
 
 
-@compiled
+@compiled_apart
+def _sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
+    cycle.sense(fleet, i, tick, now_us, seed, true, seen, state, controls)
+
+
+@compiled_apart
+def _advance(fleet, i, start_us, period_us, step_us):
+    return cycle.advance(fleet, i, start_us, period_us, step_us)
+
+
+@compiled_within
 def _now(group, timing):
     return group.tick[0] * timing.period_us
 
 
-@compiled
+@compiled_within
 def _answers_last(group, timing, i):
     """Whether the newest command of vehicle ``i`` answers its last state."""
     return group.tick[0] > 0 and group.answered[i] == _now(group, timing) - timing.period_us
 
 
-@compiled
+@compiled_within
 def tick(group, timing):
     """One tick of the vehicles: the newest commands come into force, states go out, and all fly on to the next."""
     for i in range(group.alive.shape[0]):
@@ -82,7 +92,7 @@ def tick(group, timing):
             fly_on(group, timing, i)
 
 
-@compiled
+@compiled_within
 def bring_into_force(group, timing, i):
     """The newest command of vehicle ``i``; one that does not answer its last state is late."""
     if group.tick[0] == 0:
@@ -102,7 +112,7 @@ def bring_into_force(group, timing, i):
     latch(fleet, i, group.latched)
 
 
-@compiled
+@compiled_within
 def tell(group, timing, i):
     """Send the state; with the command in force, unless it is the one that answers the last state."""
     now_us, state = _now(group, timing), group.states[i]
@@ -114,7 +124,7 @@ def tell(group, timing, i):
     send_state(group.wire, i, now_us, state, group.controls[i], not known)
 
 
-@compiled
+@compiled_within
 def _know(group, i, now_us, out):
     """Write what only the simulator knows of vehicle ``i`` into ``out``, in the order of ``process.truth_array``."""
     commands = group.true.shape[1]
@@ -125,7 +135,7 @@ def _know(group, i, now_us, out):
     _conditions(group.fleet, i, now_us / 1e6, out[acting + group.controls.shape[1] :])
 
 
-@compiled
+@compiled_within
 def record(group, timing, i):
     """A row of the recording, where one is due."""
     if group.tick[0] % timing.record_every != 0:
@@ -139,7 +149,7 @@ def record(group, timing, i):
     group.rows.filled[i] += 1
 
 
-@compiled
+@compiled_within
 def fly_on(group, timing, i):
     """Fly vehicle ``i`` for one period; one that leaves its model is lost."""
     why = _advance(group.fleet, i, _now(group, timing), timing.period_us, timing.step_us)
@@ -149,7 +159,7 @@ def fly_on(group, timing, i):
         group.lost[0] += 1
 
 
-@compiled
+@compiled_within
 def know(group, timing):
     """Set ``known`` of the living after this tick, for the station."""
     for i in range(group.alive.shape[0]):
@@ -160,7 +170,7 @@ def know(group, timing):
 # The flight of a vehicle process: ticks, and waiting for them.
 
 
-@compiled
+@compiled_within
 def _read_command(group, i):
     """The stamp of the command in the datagram at hand for vehicle ``i``; -1 if there is none, -2 if it is too old."""
     wire = group.wire
@@ -180,7 +190,7 @@ def _read_command(group, i):
     return -2
 
 
-@compiled
+@compiled_within
 def take(group, i):
     """Take in the datagram at hand for vehicle ``i``: its command counts, if it is one; else its cause."""
     stamp = _read_command(group, i)
@@ -194,9 +204,9 @@ def take(group, i):
     return GO_ON
 
 
-@compiled
-def listen(group, timing, until):
-    """Read what the autopilots sent: until all have answered ``until`` (us), or, if it is -1, all that has come."""
+@compiled_within
+def listen(group, until):
+    """Read what the autopilots sent: until all have answered ``until`` (us); if it is negative, all that came."""
     for i in range(group.alive.shape[0]):
         for _ in range(_DATAGRAMS):
             if until >= 0 and (group.alive[i] == 0 or group.answered[i] >= until):
@@ -209,7 +219,7 @@ def listen(group, timing, until):
     return GO_ON
 
 
-@compiled
+@compiled_within
 def _all_answered(group, stamp):
     missing = 0
     for i in range(group.alive.shape[0]):
@@ -218,60 +228,25 @@ def _all_answered(group, stamp):
     return missing == 0
 
 
-@compiled
-def _look_around(group, milliseconds, first):
-    """Wait for the descriptors from row ``first`` of ``polled`` on; the cause if it is time for Python to look."""
-    polled = group.wire.polled
-    wait(polled[first:], milliseconds)
-    others = group.alive.shape[0]
-    if is_readable(group.wire, others) or monotonic(group.room) >= group.attention[0]:
-        return ATTEND
-    return GO_ON
-
-
-@compiled
-def await_answers(group, timing):
-    """Lockstep: wait until every living vehicle's last state has been answered."""
-    wanted = _now(group, timing) - timing.period_us
-    while wanted >= 0:
-        cause = listen(group, timing, wanted)
-        if cause != GO_ON:
-            return cause
-        if _all_answered(group, wanted):
-            break
-        now = monotonic(group.room)
-        if now - group.since[0] > RESEND:
-            group.since[0] = now
-            for i in range(group.alive.shape[0]):
-                if group.alive[i] == 1 and group.answered[i] < wanted:
-                    send_again(group.wire, i)
-        cause = _look_around(group, _LOOK, 0)
-        if cause != GO_ON:
-            return cause
-    return GO_ON
-
-
-@compiled
-def await_pace(group, timing, lockstep):
-    """Wait until the tick is due. In lockstep, a swarm that has fallen behind goes on from where it is."""
+@compiled_within
+def due_at(group, timing):
+    """Wall time at which the next tick is due, s."""
     pace = group.pace
-    due = pace[0] + (group.tick[0] - pace[1]) * (timing.period_us / 1e6) / pace[2]
-    others = group.alive.shape[0]
-    while True:
-        rest = due - monotonic(group.room)
-        if lockstep and rest < -_BEHIND:
-            pace[0] += -rest - _BEHIND
-        if rest <= 0.0:
-            return GO_ON
-        if rest < 1e-3:
-            pause(rest, group.room)
-        else:
-            cause = _look_around(group, min(int(rest * 1e3), _LOOK), others)
-            if cause != GO_ON:
-                return cause
+    return pace[0] + (group.tick[0] - pace[1]) * (timing.period_us / 1e6) / pace[2]
 
 
-@compiled
+@compiled_within
+def ask_again(group, wanted, now):
+    """Send states again whose answers do not come: a datagram may be lost."""
+    if wanted < 0 or now - group.since[0] < RESEND:
+        return
+    group.since[0] = now
+    for i in range(group.alive.shape[0]):
+        if group.alive[i] == 1 and group.answered[i] < wanted:
+            send_again(group.wire, i)
+
+
+@compiled_within
 def something_to_do(group, timing):
     """Whether Python has something to do after this tick: rows to write, losses and events to tell, truth to send."""
     if group.fleet.happenings.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
@@ -283,27 +258,43 @@ def something_to_do(group, timing):
 def fly(group, timing, lockstep):
     """Fly tick after tick until Python has something to do; why, see `link.waiting`.
 
-    In lockstep a tick waits for the answers to the last states, otherwise for the clock alone. The pace holds both.
+    A tick waits for its time; in lockstep also for the answers to the last states, and a swarm that has fallen behind
+    its pace goes on from where it is.
     """
+    others = group.alive.shape[0]
     while True:
-        if group.tick[0] > group.limit[0] and group.tick[0] <= timing.ticks:
-            return HELD
-        if monotonic(group.room) >= group.attention[0]:
-            return ATTEND
-        cause = GO_ON
-        if group.tick[0] <= timing.ticks:
-            cause = await_pace(group, timing, lockstep)
-        if cause == GO_ON:
-            cause = await_answers(group, timing) if lockstep else listen(group, timing, -1)
+        over = group.tick[0] > timing.ticks or not group.alive.any()
+        held = group.tick[0] > group.limit[0] and not over
+        wanted = _now(group, timing) - timing.period_us if lockstep and not held else -1
+        cause = listen(group, wanted)
         if cause != GO_ON:
             return cause
-        if group.tick[0] > timing.ticks or not group.alive.any():
-            return FLOWN
-        tick(group, timing)
-        group.since[0] = monotonic(group.room)
-        work = something_to_do(group, timing)
-        if work:
-            know(group, timing)
-        group.tick[0] += 1
-        if work:
-            return WORK
+        answered = wanted < 0 or _all_answered(group, wanted)
+        now = monotonic(group.room)
+        if now >= group.attention[0]:
+            return ATTEND
+        rest = 0.0 if over or held else due_at(group, timing) - now
+        if answered and rest <= 0.0 and not held:
+            if over:
+                return FLOWN
+            if lockstep and rest < -_BEHIND:
+                group.pace[0] += -rest - _BEHIND
+            tick(group, timing)
+            group.since[0] = now
+            work = something_to_do(group, timing)
+            if work:
+                know(group, timing)
+            group.tick[0] += 1
+            if work:
+                return WORK
+        elif 0.0 < rest < _SHORT:
+            pause(rest, group.room)
+        else:
+            # Until the tick is due nothing else is waited for: what has come is read then, all at once.
+            first, milliseconds = (others, min(int(rest * 1e3), _LOOK)) if rest > 0.0 else (0, _LOOK)
+            ask_again(group, wanted, now)
+            wait(group.wire.polled[first:], milliseconds)
+            if is_readable(group.wire, others):
+                return ATTEND
+            if held:
+                return HELD

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import THRUST
-from ftcc.link.compiled import compiled, copy
+from ftcc.link.compiled import compiled, compiled_within, copy
 from ftcc.link.happenings import Happenings
 from ftcc.link.philox import GUST, gaussian_pair, philox
 
@@ -229,12 +229,12 @@ class Fleet(NamedTuple):
     """(k, d): room for the disturbances of a step."""
 
 
-@compiled
+@compiled_within
 def _onset(since: float, rate: float) -> float:
     return 1.0 if rate == 0.0 else 1.0 - math.exp(-rate * since)
 
 
-@compiled
+@compiled_within
 def healthy(since, period, duty):
     """Whether what fails now and then is right at ``since`` (s) after its failure began."""
     return (since + _ROUNDING) % period < duty * period
@@ -308,7 +308,7 @@ def latch(fleet, i, command):
     copy(command, line[last])
 
 
-@compiled
+@compiled_within
 def _saturated(fleet, i, actuator):
     asked = fleet.command[i, actuator]
     if actuator == THRUST and fleet.autothrottle[i, 0] > 0.0:
@@ -316,14 +316,14 @@ def _saturated(fleet, i, actuator):
     return min(max(asked, fleet.limits[i, actuator, 0]), fleet.limits[i, actuator, 1])
 
 
-@compiled
+@compiled_within
 def hold_speed(fleet, i, airspeed):
     """Set the thrust that the autothrottle of vehicle ``i`` asks for at this airspeed (m/s)."""
     gain, wanted, thrust = fleet.autothrottle[i, 0], fleet.autothrottle[i, 1], fleet.autothrottle[i, 2]
     fleet.autothrottle[i, 3] = thrust + gain * (wanted - airspeed)
 
 
-@compiled
+@compiled_within
 def _immediate(fleet, i, actuator, rate):
     return fleet.lag[i, actuator] == 0.0 and rate == math.inf
 

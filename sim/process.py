@@ -34,8 +34,6 @@ __all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
 
 _ATTENTION = 0.05
 """Wall time between two looks at the launcher and the clock, s."""
-_HELD = 1.0
-"""Longest wait of a swarm that is held, wall s."""
 _NO_LIMIT = np.iinfo(np.int64).max
 
 _CLEARANCE = Column("clearance", "m", "height above the obstacle below, or above z = 0 where there is none")
@@ -155,10 +153,9 @@ class Vehicles:
         self.group.attention[0] = time.monotonic() + _ATTENTION
 
     def hold(self) -> None:
-        """Tell the launcher that this process is held, and wait for it."""
+        """Tell the launcher, once, that this process is held."""
         self.gate.hold(self.tick)
         self.stall.progress()
-        self.waiter.wait(_HELD)
 
     def complain(self) -> None:
         """Say for whom this process waits, where it has waited for long."""

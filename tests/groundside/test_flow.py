@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -81,6 +82,17 @@ def test_another_speed_begins_at_a_tick_that_is_the_same_for_all_and_not_past():
     assert new.wall == pytest.approx(pace.wall + (new.tick - pace.tick) * 0.01)
 
 
-def test_lockstep_has_no_speed():
+def test_in_lockstep_another_speed_begins_wherever_each_process_is():
+    """Nobody knows how far a swarm has come that its computer may hold back."""
+    swarm = Swarm(0, lockstep=True)
+    swarm.flow.begin()
+    for speed in (4.0, math.inf, 0.5):
+        swarm.said.clear()
+        swarm.flow.set_speed(speed)
+        (pace,) = swarm.said
+        assert (pace.tick, pace.speed) == (None, speed)
+
+
+def test_the_wall_clock_cannot_run_as_fast_as_possible():
     with pytest.raises(FlowError, match="lockstep"):
-        Swarm(0, lockstep=True).flow.set_speed(2.0)
+        Swarm(0).flow.set_speed(math.inf)
