@@ -185,7 +185,7 @@ class _Watch:
         if event.severity == "error" and event.t <= self.duration:
             self.problems.append(event.text.splitlines()[0])
 
-    def progress(self, t: float) -> None:
+    def progress(self, t: float, _pace: Pace) -> None:
         """The flight has come to ``t``."""
         now = time.monotonic()
         if self.enough or now - self.begun < _SETTLED:

@@ -88,8 +88,13 @@ def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple
     of UAVs and of the in-edges that each has at most.
     """
     k = edges[0]
+    truth, command, acting, conditions, signals = (np.full((rows, k, width), np.nan) for width in widths)
     return Recording(
-        *(np.full((rows, k, width), np.nan) for width in widths),
+        truth=truth,
+        command=command,
+        acting=acting,
+        conditions=conditions,
+        signals=signals,
         links=np.full((reports, *edges, len(LINK_REPORT)), np.nan),
         lost=np.zeros(k, np.int64),
         lost_us=np.zeros(k, np.int64),
@@ -203,7 +208,7 @@ def _ideal_tick(world, timing, n):
         if lost[i] == 0:
             if autopilots.leader[i] == 0:
                 _announce(autopilots, inbox, i)
-            _tell(autopilots, world.exchange, world.events, i, world.exchange.count[i], now)
+            _tell(autopilots, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
     if _SWEEPS > 1:
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:

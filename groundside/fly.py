@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.feed import Feed
-from ftcc.groundside.launcher import Outcome, Swarm
+from ftcc.groundside.launcher import Outcome, Swarm, automatic_pack
 from ftcc.groundside.monitor import Monitor
+from ftcc.groundside.pace import Setup, usable_cores
+from ftcc.groundside.pacing import Pacing
 from ftcc.groundside.registry import Card, Control, Entry
-from ftcc.groundside.snapshot import Event
+from ftcc.groundside.snapshot import Event, Pace
 from ftcc.link.ground import LISTENERS, Address
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Clock", "FlightOptions", "Viewer", "fly"]
 
+Progress = Callable[[float, Pace], None]
+"""Called with the simulated time (s) that a flight has come to, and its pace."""
 Clock = Literal["lockstep", "wall"]
 """What a tick waits for: for everybody, then for the wall clock; or for the wall clock alone."""
 Viewer = Literal["web", "native", "none"]
@@ -73,6 +77,7 @@ class _Flight:
     feed: Feed | None
     log: EventLog
     say: Callable[[Event], None]
+    pacing: Pacing
     next_event: int = 0
     refreshed: float = 0.0
 
@@ -91,17 +96,32 @@ class _Flight:
             self.note(Event(t, "warning", text, uav))
             self.next_event += 1
 
-    def refresh(self, progress: Callable[[float], None]) -> None:
+    def watch_pace(self) -> None:
+        """Measure how fast the swarm flies, and say where it is too slow."""
+        flown = round(self.station.t / self.mission.timing.period) * len(self.mission.vehicles)
+        text = self.pacing.look(
+            time.monotonic(),
+            self.station.t,
+            (self.station.late, flown),
+            [(child.name, child.process.pid or 0, child.kind) for child in self.swarm.flying],
+            self.dashboard.pids if self.dashboard is not None else [],
+        )
+        if text:
+            self.note(Event(-1.0, "warning", text))
+
+    def refresh(self, progress: Progress) -> None:
         """Draw the swarm, at most ten times a second."""
         if time.monotonic() - self.refreshed < _REFRESH:
             return
         self.refreshed = time.monotonic()
         self.scheduled_events()
-        progress(self.station.t)
+        if self.swarm.flow.state == "flying" and self.station.t > 0.0:
+            self.watch_pace()
+        progress(self.station.t, self.pacing.pace)
         # The first picture sets the scale: it waits for everybody, but not for ever.
         if not (self.station.complete or self.station.t > 1.0):
             return
-        snapshot = self.station.snapshot()
+        snapshot = replace(self.station.snapshot(), pace=self.pacing.pace)
         if self.feed is not None:
             self.feed.offer(snapshot)
         if self.dashboard is not None:
@@ -115,7 +135,7 @@ def fly(
     options: FlightOptions,
     ports: PortBlock,
     say: Callable[[Event], None],
-    progress: Callable[[float], None],
+    progress: Progress,
     started: Callable[[str | None], None],
 ) -> Outcome:
     """Fly ``mission`` and leave a complete run in ``options.folder``.
@@ -123,7 +143,7 @@ def fly(
     Parameters
     ----------
     say : called with every event.
-    progress : called with the simulated time, up to ten times a second.
+    progress : called with the simulated time and the pace, up to ten times a second.
     started : called once everybody is ready, with the viewer's address or None.
 
     Ctrl-C and SIGTERM end the flight in order.
@@ -158,24 +178,31 @@ def fly(
         ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog", options.id_offset
     )
     log = EventLog(folder / "events.jsonl")
-    flight = _Flight(mission, swarm, station, None, None, log, say)
+    asked = None if math.isinf(options.speed) else options.speed
+    setup = Setup(asked, len(uavs), options.pack, automatic_pack(len(uavs)), usable_cores())
+    pacing = Pacing(setup, options.lockstep)
+    flight = _Flight(mission, swarm, station, None, None, log, say, pacing)
     control = None
+    flown_for = 0.0
+    """Wall time of the flight, s."""
     with _stopping_on_signals(swarm):
         try:
             flight.dashboard = _dashboard(mission, options, ports)
             address = flight.dashboard.address if flight.dashboard else None
             control = Control(_entry(mission, options, ports, address), lambda what, how: _obey(flight, what, how))
             flight.feed = Feed(folder.name)
-            _loop(flight, lambda: swarm.ready, control, _FIRST_START, lambda t: None)
+            _loop(flight, lambda: swarm.ready, control, _FIRST_START, _unseen)
             started(address)
             swarm.go()
+            begun = time.monotonic()
             _loop(flight, lambda: swarm.over, control, None, progress)
+            flown_for = time.monotonic() - begun
             station.read()
             flight.refreshed = 0.0
             flight.refresh(progress)
         finally:
             swarm.stop()
-            _loop(flight, lambda: swarm.over, None, 5.0, lambda t: None)
+            _loop(flight, lambda: swarm.over, None, 5.0, _unseen)
             swarm.release()
             station.close()
             if control:
@@ -192,6 +219,10 @@ def fly(
         f"flight over: {swarm.outcome.late} of {swarm.outcome.ticks} ticks late",
         late=swarm.outcome.late,
         ticks=swarm.outcome.ticks,
+        factor=round(swarm.outcome.flown * mission.timing.period / flown_for, 3) if flown_for else None,
+        asked=pacing.pace.asked,
+        limit=pacing.pace.limit,
+        advice=pacing.pace.advice,
         late_of={str(uav): state.late for uav, state in station.snapshot().uavs.items()},
     )
     log.close()
@@ -203,7 +234,7 @@ def _loop(
     done: Callable[[], bool],
     control: Control | None,
     seconds: float | None,
-    progress: Callable[[float], None],
+    progress: Progress,
 ) -> None:
     """Attend to everybody until ``done`` or, at most, for ``seconds``; a stop ends the wait for readiness too."""
     until = None if seconds is None else time.monotonic() + seconds
@@ -225,6 +256,10 @@ def _loop(
         flight.refresh(progress)
 
 
+def _unseen(_t: float, _pace: Pace) -> None:
+    """Nobody looks at the progress."""
+
+
 def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
     """A command from the control socket.
 
@@ -237,7 +272,10 @@ def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[s
     match command:
         case "status":
             t = flow.tick * flow.period if flow.state == "held" else flight.station.t
-            return {"state": flow.state, "t": t, "speed": None if math.isinf(flow.speed) else flow.speed}
+            pace = flight.pacing.pace
+            reached = None if math.isnan(pace.factor) else pace.factor
+            told = {"speed": pace.asked, "factor": reached, "limit": pace.limit, "advice": pace.advice}
+            return {"state": flow.state, "t": t, **told}
         case "stop":
             flight.swarm.stop()
         case "pause":
@@ -247,10 +285,12 @@ def _obey(flight: _Flight, command: str, arguments: Mapping[str, Any]) -> dict[s
             flow.step(max(1, int(arguments["ticks"])))
         case "resume":
             flow.resume()
+            flight.pacing.restart()
             text = "resumed"
         case "speed":
             factor = arguments["factor"]
             flow.set_speed(math.inf if factor is None else float(factor))
+            flight.pacing.ask(flow.speed)
             text = "speed max" if factor is None else f"speed {flow.speed:g}"
         case _:
             raise ValueError(f"unknown command {command!r}")

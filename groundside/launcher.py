@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.flow import Flow
 from ftcc.groundside.snapshot import Event
@@ -47,14 +47,17 @@ def automatic_pack(uavs: int) -> int:
     return max(1, -(-uavs // pairs))
 
 
+Role = Literal["vehicle", "autopilot"]
+"""What a process flies."""
+
+
 @dataclass
 class Child:
     """A process of the swarm."""
 
     name: str
     uavs: tuple[int, ...]
-    kind: str
-    """"vehicle" or "autopilot"."""
+    kind: Role
     process: BaseProcess
     pipe: Connection
     ready: bool = False
@@ -140,7 +143,7 @@ class Swarm:
         self.outcome = Outcome()
         self.children: list[Child] = []
         self.stopping_since: float | None = None
-        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying)
+        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying_vehicles)
         uavs = [spec.uav for spec in mission.vehicles]
         groups = [tuple(uavs[start : start + pack]) for start in range(0, len(uavs), pack)]
         self.setting = Setting(
@@ -177,7 +180,12 @@ class Swarm:
                 self._spawn(context, "autopilot", group, run_autopilots, [autopilots[uav] for uav in group])
 
     def _spawn(
-        self, context: Any, kind: str, group: tuple[int, ...], run: Callable[..., None], specs: Sequence[Any]
+        self,
+        context: Any,
+        kind: Literal["vehicle", "autopilot"],
+        group: tuple[int, ...],
+        run: Callable[..., None],
+        specs: Sequence[Any],
     ) -> None:
         span = f"{group[0]}" if len(group) == 1 else f"{group[0]}-{group[-1]}"
         name = f"uav{span}-{kind}"
@@ -201,9 +209,14 @@ class Swarm:
         """Begin the flight: one epoch for all."""
         self.tell_all(Go(*self.flow.begin()))
 
-    def _flying(self) -> list[str]:
+    @property
+    def flying(self) -> list[Child]:
+        """The processes that still fly."""
+        return [child for child in self.children if not (child.ended or child.dead)]
+
+    def _flying_vehicles(self) -> list[str]:
         """Names of the vehicle processes that still fly."""
-        return [child.name for child in self.children if child.kind == "vehicle" and not (child.ended or child.dead)]
+        return [child.name for child in self.flying if child.kind == "vehicle"]
 
     def tell_all(self, message: Any) -> None:
         """Say something to every process."""

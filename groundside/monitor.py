@@ -57,6 +57,7 @@ class Monitor:
         self._ear = Ear(port, sources)
         self._uavs = {uav: _Heard() for uav in uavs}
         self._of_system = {uav + id_offset: heard for uav, heard in self._uavs.items()}
+        self._late = truth_array(plant).index("late")
         self._read_state = _state_reader(find(plant), truth_array(plant), signals)
         self._log = log.open("ab") if log else None
         self._events: list[Event] = []
@@ -113,6 +114,11 @@ class Monitor:
     def note(self, event: Event) -> None:
         """Add an event to the next snapshot."""
         self._events.append(event)
+
+    @property
+    def late(self) -> int:
+        """Ticks in which commands came too late, of all UAVs together, as far as was heard."""
+        return sum(int(heard.truth[self._late]) for heard in self._uavs.values() if heard.truth)
 
     def snapshot(self) -> Snapshot:
         """The swarm as heard so far, and what happened since the last call."""

@@ -55,7 +55,7 @@ class Exchange(NamedTuple):
     """(k, n): the row below of the UAV behind each in-edge."""
     row_of: NDArray[np.int64]
     """(256,): the row of each UAV by its id; -1 where it is not heard here."""
-    count: NDArray[np.int64]
+    next_sequence: NDArray[np.int64]
     """(s,): sequence number that the next record of a sender would have."""
     sequence: NDArray[np.int64]
     """(s, HISTORY): sequence number of each record kept; -1: none."""
@@ -87,7 +87,7 @@ def new_exchange(own: Sequence[int], senders: Sequence[Sequence[int]], edges: in
     return Exchange(
         sender=sender,
         row_of=row_of,
-        count=np.zeros(s, np.int64),
+        next_sequence=np.zeros(s, np.int64),
         sequence=np.full((s, _HISTORY), -1, np.int64),
         stamp=np.zeros((s, _HISTORY), np.int64),
         radio_on=np.zeros((s, _HISTORY), np.int64),
@@ -98,7 +98,7 @@ def new_exchange(own: Sequence[int], senders: Sequence[Sequence[int]], edges: in
 @compiled
 def post(exchange, row, sequence, stamp_us, radio_on, values):
     """Keep a record of the sender in ``row``; one that is not newer than the last is dropped."""
-    if sequence < exchange.count[row]:
+    if sequence < exchange.next_sequence[row]:
         return
     slot = sequence % _HISTORY
     exchange.sequence[row, slot] = sequence
@@ -106,13 +106,13 @@ def post(exchange, row, sequence, stamp_us, radio_on, values):
     exchange.radio_on[row, slot] = radio_on
     for m in range(exchange.values.shape[2]):
         exchange.values[row, slot, m] = values[m]
-    exchange.count[row] = sequence + 1
+    exchange.next_sequence[row] = sequence + 1
 
 
 @compiled
 def newest_slot(exchange, row):
     """Where the last record of the sender in ``row`` stands in the arrays of records."""
-    return (exchange.count[row] - 1) % _HISTORY
+    return (exchange.next_sequence[row] - 1) % _HISTORY
 
 
 @compiled
@@ -123,7 +123,7 @@ def deliver(exchange, inbox, radio_on, i, now_us, latency_us, seed):
     """
     for edge in range(inbox.degree[i]):
         row = exchange.sender[i, edge]
-        count = exchange.count[row]
+        count = exchange.next_sequence[row]
         sequence = max(inbox.edges[i, edge, _NEXT], count - _HISTORY)
         while sequence < count:
             slot = sequence % _HISTORY
@@ -147,8 +147,8 @@ class Header(NamedTuple):
     """Lockstep: the sender has the transmissions up to this number of all whom it waits for."""
     last: int
     """1: nothing will follow."""
-    count: int
-    """Records in it."""
+    records: int
+    """How many are in it."""
     values: int
     """Numbers in each record."""
 

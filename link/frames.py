@@ -136,8 +136,13 @@ class Payload(NamedTuple):
 def new_payload() -> Payload:
     """An empty payload."""
     longs = np.zeros(32, np.int64)
-    views = (longs.view(kind) for kind in (np.uint8, np.float32, np.uint16, np.uint32))
-    return Payload(*views, longs)
+    return Payload(
+        octets=longs.view(np.uint8),
+        floats=longs.view(np.float32),
+        shorts=longs.view(np.uint16),
+        words=longs.view(np.uint32),
+        longs=longs,
+    )
 
 
 def _checksum_table() -> NDArray[np.int64]:

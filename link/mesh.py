@@ -123,8 +123,8 @@ class Mesh:
 
     def receive(self) -> list[tuple[int, bytes]]:
         """The transmissions that have arrived since the last call, with their senders; those of one in order."""
-        # In this order: what arrives after this rings again. Zenoh's thread may be about to write: then there is nothing
-        # to read yet, and the bell rings once in vain.
+        # In this order: what arrives after this rings again. If Zenoh's thread is just about to write, there is nothing
+        # to read yet, and the bell rings once more in vain.
         self._rung = False
         with contextlib.suppress(BlockingIOError):
             os.read(self._bell, _RINGS)
@@ -137,7 +137,8 @@ class Mesh:
 
     def close(self) -> None:
         """Leave the mesh."""
-        for declared in (*self._tokens, self._liveliness, *self._subscribers, self._publisher):
+        declarations: list[Any] = [*self._tokens, self._liveliness, *self._subscribers, self._publisher]
+        for declared in declarations:
             declared.undeclare()
         self._session.close()
         os.close(self._bell)

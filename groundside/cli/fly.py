@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import shutil
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast, get_args
@@ -31,6 +28,8 @@ from ftcc.groundside.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from ftcc.groundside.registry import Entry
+    from ftcc.groundside.snapshot import Pace
     from ftcc.link.ground import Address
 
 __all__ = ["doctor", "fly", "ps", "stop"]
@@ -157,7 +156,11 @@ def fly(
         id_offset=id_offset,
     )
     bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"), console=console
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("t = {task.completed:.0f} s"),
+        TextColumn("{task.fields[pace]}"),
+        console=console,
     )
     begun = time.monotonic()
 
@@ -165,6 +168,9 @@ def fly(
         who = f"UAV {event.uav}: " if event.uav else ""
         colour = _COLOURS.get(event.severity, "white")
         bar.console.print(f"[{colour}]{max(event.t, 0.0):8.2f} s[/]  {who}{escape(event.text)}", soft_wrap=True)
+
+    def show_progress(t: float, pace: Pace) -> None:
+        bar.update(task, completed=t, pace="" if math.isnan(pace.factor) else f"{pace.factor:.2g} x real time")
 
     def started(address: str | None) -> None:
         nonlocal begun
@@ -177,9 +183,9 @@ def fly(
 
     console.print(f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {folder}", soft_wrap=True)
     with bar:
-        task = bar.add_task("starting", total=mission.timing.duration)
+        task = bar.add_task("starting", total=mission.timing.duration, pace="")
         try:
-            outcome = fly_mission(mission, options, ports, say, lambda t: bar.update(task, completed=t), started)
+            outcome = fly_mission(mission, options, ports, say, show_progress, started)
         except TimeoutError as error:
             console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
             raise typer.Exit(_FLIGHT_FAILED) from error
@@ -199,6 +205,19 @@ def fly(
         raise typer.Exit(_FLIGHT_FAILED)
 
 
+def _how_it_flies(entry: Entry) -> str:
+    """Held, or how many times real time, and what limits it."""
+    from ftcc.groundside.registry import tell
+
+    try:
+        told = tell(entry, "status") or {}
+    except (OSError, RuntimeError):
+        return "does not answer"
+    if told.get("state") != "flying" or told.get("factor") is None:
+        return str(told.get("state", ""))
+    return f"{told['factor']:.2g} x real time" + (f": {told['limit']}" if told["limit"] else "")
+
+
 def ps() -> None:
     """List the running swarms."""
     from ftcc.groundside.registry import running
@@ -207,7 +226,7 @@ def ps() -> None:
     if not entries:
         console.print("no swarm is running")
         return
-    table = Table("name", "scenario", "UAVs", "pid", "ports", "since", "dashboard", box=None)
+    table = Table("name", "scenario", "UAVs", "pid", "ports", "since", "flies", "dashboard", box=None)
     for entry in entries:
         table.add_row(
             entry.name,
@@ -216,6 +235,7 @@ def ps() -> None:
             str(entry.pid),
             f"{entry.ports[0]}-{entry.ports[1]}",
             time.strftime("%H:%M:%S", time.localtime(entry.started)),
+            _how_it_flies(entry),
             entry.viewer or "",
         )
     console.print(table)
@@ -245,46 +265,18 @@ def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="
         _tell(one, "stop")
 
 
-_MS_PER_TICK = 0.95
-"""Processor time that one UAV (vehicle and autopilot process) costs per tick, ms; measured on a 2-core AMD EPYC."""
-
-
 def doctor(
-    scenario: Annotated[str, typer.Argument(help="Scenario whose load is predicted.")] = "demo",
+    scenario: Annotated[str, typer.Argument(help="Scenario that is flown to measure.")] = "demo",
     variant: Variants = "",
+    speed: Annotated[str, typer.Option(help="Times real time that are wanted, or 'max'.")] = "1",
 ) -> None:
-    """Say whether this machine can fly a scenario, and what is missing for the browser tests."""
-    from ftcc.link.ports import PortError, reserve
+    """Say what this machine has, and, by flying a scenario for some seconds, how fast it flies it."""
+    from ftcc.groundside.doctor import examine
 
+    factor = speed_factor(speed, "--speed")
     mission = load_mission(scenario, None, variant, None, None, None)
-    cores = os.cpu_count() or 1
     table = Table("what", "found", "verdict", box=None)
-    table.add_row("Python", sys.version.split()[0], "ok")
-    table.add_row("cores", str(cores), "ok" if cores >= 2 else "few")
-    load = len(mission.vehicles) * _MS_PER_TICK / (mission.timing.period * 1e3) / cores
-    verdict = (
-        "ok" if load < 0.6 else "tight: try --pack auto" if load < 0.9 else "too much: use --pack auto or --speed max"
-    )
-    table.add_row(f"load of {mission.name} at speed 1", f"{load:.0%} of the machine", verdict)
-    try:
-        block = reserve([spec.uav for spec in mission.vehicles])
-        table.add_row("ports", f"{block.base}-{block.base + block.size - 1}", "free")
-        block.release()
-    except PortError as error:
-        table.add_row("ports", str(error), "missing")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    driver = shutil.which("chromedriver")
-    table.add_row("Chromium (browser tests)", chromium or "not found", "ok" if chromium and driver else "optional")
-    vulkan = sorted(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
-    table.add_row(
-        "Mesa Vulkan (pictures without a screen)",
-        ", ".join(path.stem for path in vulkan[:3]) or "not found",
-        "ok" if vulkan else "optional: mesa-vulkan-drivers",
-    )
-    from ftcc.link.compiled import cache_folder
-
-    compiled = len(list(cache_folder.rglob("*.nbi")))
-    table.add_row(
-        "compiled code", str(cache_folder), f"{compiled} functions" if compiled else "compiled at first start"
-    )
+    with console.status("looking around") as status:
+        for row in examine(mission, factor, progress=status.update):
+            table.add_row(*map(escape, row))
     console.print(table)

@@ -103,6 +103,11 @@ class Dashboard:
         problems, self._problems = self._problems, []
         return tuple(Event(self._t, "warning", problem) for problem in problems)
 
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of the viewer, if this process has started one."""
+        return [] if self._viewer is None else self._viewer.pids
+
     def wait(self) -> None:
         """Wait until the viewer ends; returns at once without one."""
         if self._viewer is not None:

@@ -166,6 +166,11 @@ class Viewer:
         if self._process is not None:
             self._process.wait()
 
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of what shows, if this process has started it."""
+        return [] if self._process is None else [self._process.pid]
+
     def take_problem(self) -> str | None:
         """What went wrong since the last call; each kind of problem once."""
         problem, self._problem = self._problem, None

@@ -121,10 +121,23 @@ def _facts(run: Run, mission: Mission, end: float, results: Sequence[Result]) ->
         ("exchange", f"{1e6 / timing.exchange_us:g} Hz" if mission.wire else "ideal"),
         ("seed", str(timing.seed)),
         ("late ticks", _late(run, mission)),
+        *_pace(run),
     ]
     flown = run.scenario.plan.flown
     if flown is not None and flown.settings:
         facts.append(("settings", ", ".join(flown.settings)))
+    return facts
+
+
+def _pace(run: Run) -> list[tuple[str, str]]:
+    """How many times real time a swarm of processes flew, and what limited it at last."""
+    over = next((event for event in reversed(run.events) if event.get("factor")), None)
+    if over is None:
+        return []
+    asked = "as fast as possible" if over["asked"] is None else f"asked for {over['asked']:g}"
+    facts = [("times real time", f"{over['factor']:.3g} ({asked})")]
+    if over["limit"]:
+        facts.append(("limited by", over["limit"]))
     return facts
 
 
