@@ -39,6 +39,8 @@ Viewer = Literal["web", "native", "none"]
 
 _REFRESH = 0.1
 """Least period of the dashboard and of progress, wall s."""
+_LISTENING = 0.02
+"""Longest wall time between two readings of the telemetry, s."""
 _FIRST_START = 300.0
 """Wall time that processes may need to get ready: the first start compiles, s."""
 
@@ -247,8 +249,8 @@ def _loop(
             return
         if waiting_for_ready and flight.swarm.stopping_since is not None:
             return
-        sources = [*flight.swarm.sources(), flight.station, *([control] if control else [])]
-        wait(sources, _REFRESH)
+        # The station hears something all the time: it is read now and then.
+        wait([flight.swarm.fileno(), *([control.fileno()] if control else [])], _LISTENING)
         flight.swarm.attend()
         flight.station.read()
         if control:

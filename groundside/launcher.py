@@ -10,6 +10,7 @@ import contextlib
 import multiprocessing
 import multiprocessing.connection
 import os
+import selectors
 import sys
 import time
 import types
@@ -142,6 +143,7 @@ class Swarm:
         self.on_event = on_event
         self.outcome = Outcome()
         self.children: list[Child] = []
+        self._selector = selectors.DefaultSelector()
         self.stopping_since: float | None = None
         self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying_vehicles)
         uavs = [spec.uav for spec in mission.vehicles]
@@ -193,7 +195,10 @@ class Swarm:
         process = context.Process(target=process_main, args=(name, theirs, self.setting, run, specs), name=name)
         process.start()
         theirs.close()
-        self.children.append(Child(name, group, kind, process, ours))
+        child = Child(name, group, kind, process, ours)
+        self.children.append(child)
+        for source in (ours, process.sentinel):
+            self._selector.register(source, selectors.EVENT_READ, child)
 
     @property
     def ready(self) -> bool:
@@ -230,16 +235,13 @@ class Swarm:
             self.outcome.stopped = not self.over
             self.tell_all(Stop())
 
-    def sources(self) -> list[Any]:
-        """What to wait for: pipes and sentinels of the living."""
-        living = [child for child in self.children if not child.dead]
-        return [child.pipe for child in living] + [child.process.sentinel for child in living]
+    def fileno(self) -> int:
+        """A descriptor that can be read where a process has said something, or has died."""
+        return self._selector.fileno()  # type: ignore[attr-defined,no-any-return]
 
     def attend(self) -> None:
         """Take in what the processes said, and notice who died."""
-        for child in self.children:
-            if child.dead:
-                continue
+        for child in {key.data.name: key.data for key, _ in self._selector.select(0.0)}.values():
             with contextlib.suppress(EOFError, ConnectionResetError):
                 while child.pipe.poll():
                     self._take(child, child.pipe.recv())
@@ -271,6 +273,8 @@ class Swarm:
     def _bury(self, child: Child) -> None:
         """A process is gone: say so, end its partner, and let nobody wait for it."""
         child.dead = True
+        for source in (child.pipe, child.process.sentinel):
+            self._selector.unregister(source)
         child.process.join()
         if child.ended:
             return
@@ -295,6 +299,7 @@ class Swarm:
 
     def release(self) -> None:
         """Everybody has ended: let them close and wait until they are gone."""
+        self._selector.close()
         for child in self.children:
             child.tell(Release())
         until = time.monotonic() + _END

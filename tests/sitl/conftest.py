@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -106,6 +107,23 @@ def fly(tmp_path: Path, environment: dict[str, str]) -> Iterator[Callable[..., F
             for process in leftovers:
                 if process.is_running():
                     process.kill()
+
+
+def burn() -> None:
+    while True:
+        sum(range(1000))
+
+
+@pytest.fixture
+def busy_machine() -> Iterator[None]:
+    """Two processes that take what they can get of both cores."""
+    workers = [multiprocessing.get_context("spawn").Process(target=burn, daemon=True) for _ in range(2)]
+    for worker in workers:
+        worker.start()
+    yield
+    for worker in workers:
+        worker.kill()
+        worker.join()
 
 
 @pytest.fixture

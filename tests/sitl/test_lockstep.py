@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ftcc.groundside.feed import feed_path, watched
-from tests.sitl.conftest import Flight, same_flight
+from tests.bench.swarms import swarm_file
+from tests.sitl.conftest import Flight, events, same_flight
 
 DURATION = "30"
 
@@ -30,23 +30,6 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return folder
 
     return run
-
-
-def burn() -> None:
-    while True:
-        sum(range(1000))
-
-
-@pytest.fixture
-def busy_machine() -> Iterator[None]:
-    """Two processes that take what they can get of both cores."""
-    workers = [multiprocessing.get_context("spawn").Process(target=burn, daemon=True) for _ in range(2)]
-    for worker in workers:
-        worker.start()
-    yield
-    for worker in workers:
-        worker.kill()
-        worker.join()
 
 
 def test_sixteen_processes_equal_the_simulation(fly: Callable[..., Flight], simulated: Callable[..., Path]) -> None:
@@ -101,3 +84,46 @@ def test_packed_vehicles_equal_the_simulation(
 def test_another_seed_is_another_flight_only_where_chance_plays(simulated: Callable[..., Path]) -> None:
     assert same_flight(simulated((), 1), simulated((), 2))
     assert not same_flight(simulated(("loss30",), 1), simulated(("loss30",), 2))
+
+
+@pytest.mark.parametrize(("uavs", "arguments"), [(4, ("--speed", "200")), (60, ("--speed", "100", "--pack", "auto"))])
+def test_a_computer_that_is_too_slow_slows_time_down_and_loses_nobody(
+    fly: Callable[..., Flight], busy_machine: None, tmp_path: Path, uavs: int, arguments: tuple[str, ...]
+) -> None:
+    """Asked for more than it can do, beside other programs: the flight is that of the simulation, only slower."""
+    from ftcc.groundside.mission import resolve
+    from ftcc.groundside.scenario import load
+    from ftcc.groundside.simulate import simulate
+
+    swarm = swarm_file(tmp_path, uavs, duration=20.0)
+    flight = fly(str(swarm), *arguments)
+    assert flight.wait(240) == 0, flight.output
+    simulate(resolve(load(str(swarm))), tmp_path / "simulated")
+    assert same_flight(flight.folder, tmp_path / "simulated")
+    (over,) = [event for event in events(flight.folder) if "factor" in event]
+    assert (over["late"], over["asked"]) == (0, float(arguments[1]))
+    assert 0.0 < over["factor"] < over["asked"]  # type: ignore[operator]
+
+
+def test_plain_python_flies_the_same_flight_with_processes(
+    fly: Callable[..., Flight], tmp_path: Path, environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same functions from datagram to datagram, not compiled."""
+    from ftcc.groundside.mission import resolve
+    from ftcc.groundside.scenario import load
+    from ftcc.groundside.simulate import simulate
+
+    scenario = ("containment", "--variant", "loss30", "--duration", "1", "--speed", "max", "--pack", "4")
+    environment["NUMBA_DISABLE_JIT"] = "1"
+    flight = fly(*scenario)
+    assert flight.wait() == 0, flight.output
+    simulate(resolve(load("containment", form="flight", variants=("loss30",), duration=1.0)), tmp_path / "simulated")
+    assert same_flight(flight.folder, tmp_path / "simulated")
+
+
+def test_a_swarm_in_which_one_hears_nobody_and_one_is_heard_by_nobody_flies(
+    fly: Callable[..., Flight], tmp_path: Path
+) -> None:
+    """A leader waits for the acknowledgement of a follower that has nobody to tell anything."""
+    flight = fly(str(swarm_file(tmp_path, 2, duration=20.0)), "--speed", "max")
+    assert flight.wait() == 0, flight.output

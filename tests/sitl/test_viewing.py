@@ -84,7 +84,7 @@ def picture(viewer: Any) -> np.ndarray:
 @pytest.mark.browser
 @pytest.mark.skipif(not DRIVERS, reason="needs the system package mesa-vulkan-drivers")
 def test_a_flight_in_lockstep_opens_with_its_blueprint(fly: Callable[..., Flight], viewer: Any) -> None:
-    flight = fly("demo", "--speed", "max", "--duration", "20", "--pack", "auto")
+    flight = fly("demo", "--speed", "8", "--duration", "20", "--pack", "auto")
     assert flight.wait() == 0, flight.output
     assert assert_the_recording_shows_what_was_flown(flight) == pytest.approx(20.0)
 

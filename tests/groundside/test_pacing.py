@@ -1,0 +1,60 @@
+"""What is said, and when, of a flight that does not keep its pace."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from ftcc.groundside.pace import Setup
+from ftcc.groundside.pacing import Pacing
+
+SETUP = Setup(asked=1.0, uavs=8, pack=1, automatic=8, cores=2)
+OWN = [("uav1-vehicle", os.getpid(), "vehicle")]
+
+
+def said(pacing: Pacing, seconds: int, factor: float, late_share: float = 0.0) -> list[str]:
+    """Looked at once a second, from the start of the flight on."""
+    texts = []
+    for n in range(seconds):
+        t = factor * n
+        ticks = round(800 * t)
+        texts.append(pacing.look(100.0 + n, t, (round(late_share * ticks), ticks), OWN, []))  # type: ignore[arg-type]
+    return [text for text in texts if text]
+
+
+def test_a_swarm_that_keeps_its_pace_says_nothing() -> None:
+    pacing = Pacing(SETUP, lockstep=True)
+    assert said(pacing, 20, 1.0) == []
+    assert pacing.pace.factor == pytest.approx(1.0)
+    assert pacing.pace.limit == ""
+
+
+def test_a_swarm_in_lockstep_that_falls_short_says_so_once() -> None:
+    pacing = Pacing(SETUP, lockstep=True)
+    (text,) = said(pacing, 20, 0.4)
+    assert text.startswith("0.4 times real time instead of 1: ")
+    assert "--pack auto" in text
+    assert pacing.pace.factor == pytest.approx(0.4)
+
+
+def test_as_fast_as_possible_is_never_too_slow() -> None:
+    pacing = Pacing(SETUP, lockstep=True)
+    pacing.ask(float("inf"))
+    assert said(pacing, 20, 0.4) == []
+    assert pacing.pace.asked is None
+
+
+@pytest.mark.parametrize(("share", "times"), [(0.04, 0), (0.06, 1)])
+def test_the_wall_clock_says_once_that_more_than_one_tick_in_twenty_is_late(share: float, times: int) -> None:
+    texts = said(Pacing(SETUP, lockstep=False), 20, 1.0, share)
+    assert len(texts) == times
+    assert all("6% of the ticks were late in the last 2 s" in text and "--clock lockstep" in text for text in texts)
+
+
+def test_after_a_pause_nothing_of_before_counts() -> None:
+    pacing = Pacing(SETUP, lockstep=True)
+    said(pacing, 4, 0.4)
+    pacing.restart()
+    assert pacing.pace.factor != pacing.pace.factor, "nan: not known"
+    assert said(pacing, 4, 0.4) == []
