@@ -17,7 +17,7 @@ from ftcc.airside.process import columns as autopilot_columns
 from ftcc.groundside import Run, RunError, load, resolve
 from ftcc.groundside.run import new_folder
 from ftcc.groundside.simulate import fly, simulate
-from ftcc.link.recording import PartWriter, part_path
+from ftcc.link.recording import ROWS, PartWriter, part_path
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns as vehicle_columns
 
@@ -39,8 +39,9 @@ def write_parts(run: Run, folder: Path, keep: Callable[[int, str], int | None] =
                 continue
             writer = PartWriter(part_path(folder, uav, role), columns)
             table = np.column_stack([run.column(column.name, uav) for column in columns])
-            for row in table[: keep(uav, role)]:
-                writer.row(row)
+            rows = table[: keep(uav, role)]
+            for begin in range(0, len(rows), ROWS):
+                writer.write(rows[begin : begin + ROWS])
             writer.close()
     return Run(folder)
 

@@ -55,7 +55,7 @@ def test_who_watches_changes_nothing(
 ) -> None:
     """One reads for a while and leaves, one never reads."""
     monkeypatch.setenv("FTCC_RUNTIME_DIR", environment["FTCC_RUNTIME_DIR"])
-    flight = fly("containment", "--speed", "max", "--duration", DURATION, "--seed", "1", "--hold", "--pack", "auto")
+    flight = fly("containment", "--speed", "20", "--duration", DURATION, "--seed", "1", "--hold", "--pack", "auto")
     flight.wait_until(lambda: feed_path(flight.folder.name).exists() and "held" in flight.output)
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as idle:
         idle.connect(str(feed_path(flight.folder.name)))
