@@ -25,8 +25,8 @@ SCHEME_ENTRY_POINTS = "ftcc.schemes"
 
 _KEPT_CACHES = 6
 _PACKAGES = ("link", "sim", "airside")
-_LIBRARIES = ("numba", "numpy", "scipy")
-"""What the contents depend on beside the sources."""
+_LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
+"""What the contents depend on beside the sources: pymavlink gives the layouts of messages."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
