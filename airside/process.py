@@ -169,8 +169,8 @@ class Crew:
             if group.active[i]:
                 link.report(int(group.done[i]) * self.timing.period_us)
         flying = [link for link in self.ground if link.seat.alive]
-        group.report_us[0] = min(link.next_us for link in flying)
-        group.report_wall[0] = min(link.next_wall for link in flying)
+        group.report_us[0] = min((link.next_us for link in flying), default=0)
+        group.report_wall[0] = min((link.next_wall for link in flying), default=0.0)
 
     def report_soon(self) -> None:
         """Look after the next tick what is due."""
