@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ftcc.airside.autopilots import aim
-from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, WRITE
+from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import encode_command
 from ftcc.link.channel import report_link
@@ -19,6 +19,7 @@ from ftcc.link.exchange import append, begin
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, wait
+from ftcc.link.timing import ticks_a_second
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, MAIL, WORK
 from ftcc.link.wire import (
     BY_ATTITUDE,
@@ -174,7 +175,7 @@ def report(group, timing, i, now_us):
         row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
         copy(group.autopilots.signals[i], row[2:])
         rows.filled[i] += 1
-    if n % max(1, round(1e6 / timing.period_us)) == 0:
+    if n % ticks_a_second(timing.period_us) == 0:
         for edge in range(group.inbox.degree[i]):
             row = links.values[i, links.filled[i]]
             row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
@@ -184,13 +185,15 @@ def report(group, timing, i, now_us):
 
 
 @compiled_within
-def something_to_do(group, now_us):
+def something_to_do(group, timing, now_us):
     """Whether Python has something to do after this tick; what, says ``to_do``."""
     to_do = 0
     if group.transmission.used[0] > 0:
         to_do |= PUBLISH
     if is_full(group.rows) or is_full(group.link_rows):
         to_do |= WRITE
+    if now_us // timing.period_us % ticks_a_second(timing.period_us) == 0:
+        to_do |= SECOND
     if group.autopilots.happenings.used[0] > 0:
         to_do |= NOTE
     if group.given_up[0] > 0 or group.unsendable[0] > 0:
@@ -288,7 +291,7 @@ def _fly_tick(group, timing, n):
     for i in range(group.alive.shape[0]):
         group.active[i] = 1 if group.alive[i] == 1 and group.pending[i] == n else 0
     tick(group, timing, n * timing.period_us)
-    return something_to_do(group, n * timing.period_us)
+    return something_to_do(group, timing, n * timing.period_us)
 
 
 @compiled_to_wait

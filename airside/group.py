@@ -22,7 +22,7 @@ from ftcc.link.recording import Rows
 from ftcc.link.timing import Timing
 from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, STATE, Wire, new_wire
 
-__all__ = ["GIVE_UP", "NOTE", "PUBLISH", "REPORT", "WRITE", "AutopilotGroup", "build_group", "flight_of"]
+__all__ = ["GIVE_UP", "NOTE", "PUBLISH", "REPORT", "SECOND", "WRITE", "AutopilotGroup", "build_group", "flight_of"]
 
 
 @functools.cache
@@ -35,8 +35,9 @@ def flight_of(scheme: str) -> ModuleType:
     return flight
 
 
-PUBLISH, WRITE, NOTE, GIVE_UP, REPORT = 1, 2, 4, 8, 16
-"""What there may be to do after a tick: a transmission for the mesh, full rows, events, a UAV that ends, telemetry."""
+PUBLISH, WRITE, NOTE, GIVE_UP, REPORT, SECOND = 1, 2, 4, 8, 16, 32
+"""What there may be to do after a tick: a transmission for the mesh, full rows, events, a UAV that ends, telemetry; and
+whether a simulated second is full."""
 
 
 class AutopilotGroup(NamedTuple):

@@ -15,7 +15,7 @@ from types import ModuleType
 
 from ftcc.airside.autopilots import tick_of, told
 from ftcc.airside.ground import GroundLink, Seat
-from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, WRITE, AutopilotGroup, build_group, flight_of
+from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE, AutopilotGroup, build_group, flight_of
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
@@ -156,11 +156,18 @@ class Crew:
         if to_do & WRITE:
             self.recorder.write()
             self.link_recorder.write()
+        if to_do & SECOND:
+            self.write_if_due(in_step=True)
         if to_do & NOTE:
             for at_us, uav, severity, text in told(self.group.autopilots, self.specs):
                 self.gate.tell(Said(severity, text, uav, at_us))
         if to_do & REPORT:
             self.report()
+
+    def write_if_due(self, in_step: bool) -> None:
+        """Write what has been recorded, where it is time."""
+        self.recorder.write_if_due(in_step)
+        self.link_recorder.write_if_due(in_step)
 
     def report(self) -> None:
         """Tell the ground what is due, and when something will be due next."""
@@ -200,8 +207,7 @@ class Crew:
             self.group.attention[0] = now + _ATTENTION
             for link in self.ground:
                 link.attend()
-            self.recorder.write_if_due()
-            self.link_recorder.write_if_due()
+            self.write_if_due(in_step=False)
             self.complain()
 
     def complain(self) -> None:

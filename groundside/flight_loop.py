@@ -22,7 +22,7 @@ from ftcc.link.attitude_target import TARGET, decode_target, encode_target
 from ftcc.link.channel import LINK_REPORT, Inbox, report_link
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.link.exchange import Exchange, new_exchange, newest_slot
-from ftcc.link.timing import Timing
+from ftcc.link.timing import Timing, ticks_a_second
 from ftcc.link.wire import STATE
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import DIVERGED, TRUTH, Fleet, X, Z, latch
@@ -292,7 +292,7 @@ def _settle(world, now, dt):
 def _record(world, timing, n):
     """A row of each UAV that flies, and one on each of its in-edges, where they are due."""
     recording, fleet, now = world.recording, world.fleet, n * timing.period_us
-    every, report_every = timing.record_every, max(1, round(1e6 / timing.period_us))
+    every, report_every = timing.record_every, ticks_a_second(timing.period_us)
     for i in range(recording.lost.shape[0]):
         if n % every == 0 and _flies(recording, i, now):
             row = n // every

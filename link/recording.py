@@ -41,7 +41,7 @@ ROWS = 500
 
 _SPARE = 256
 """Rows beyond them, in which a tick surely finds room: one for each UAV that may be heard."""
-_FLUSH = 1.0
+_FLUSH = 0.9
 """Wall time after which rows are written though there is room for more, s."""
 
 _INTEGERS = ("uav", "sender")
@@ -173,9 +173,14 @@ class Recorder:
             part.write(self.rows.values[i, : self.rows.filled[i]])
         self.rows.filled[:] = 0
 
-    def write_if_due(self) -> None:
-        """Write where rows have waited for a second of wall time, or where a UAV has filled its rows."""
-        if time.monotonic() - self._written > _FLUSH or self.rows.filled.max() >= ROWS:
+    def write_if_due(self, in_step: bool) -> None:
+        """Write where rows have waited for long, or where a UAV has filled its rows.
+
+        Where a tick is ``in_step``, the same for all processes, a second of wall time is long enough: so what has been
+        written of a UAV by its two processes ends at the same instant, while they fly no faster than the clock.
+        """
+        waited = time.monotonic() - self._written
+        if waited > (_FLUSH if in_step else 2.0 * _FLUSH) or self.rows.filled.max() >= ROWS:
             self.write()
 
     def close(self) -> None:

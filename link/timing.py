@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Timing"]
+from ftcc.link.compiled import compiled
+
+__all__ = ["Timing", "ticks_a_second"]
+
+
+@compiled
+def ticks_a_second(period_us):
+    """Ticks in a second, as nearly as the period allows."""
+    return max(1, round(1e6 / period_us))
 
 
 class Timing(NamedTuple):
@@ -37,7 +45,7 @@ class Timing(NamedTuple):
     @property
     def report_every(self) -> int:
         """Ticks between recorded rows on the links: a second, as nearly as the period allows."""
-        return max(1, round(1e6 / self.period_us))
+        return int(ticks_a_second(self.period_us))
 
     @property
     def duration(self) -> float:

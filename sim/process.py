@@ -204,7 +204,7 @@ class Vehicles:
     def work(self, tick: int) -> None:
         """Write rows, tell what happened, send the truth to the station."""
         now_us = tick * self.timing.period_us
-        self.recorder.write_if_due()
+        self.recorder.write_if_due(in_step=tick % self.timing.report_every == 0)
         if self.group.fleet.happenings.used[0]:
             for at_us, i, _, number in drained(self.group.fleet.happenings):
                 uav = self.specs[i].uav
