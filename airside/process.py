@@ -19,6 +19,7 @@ from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE, Au
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.compiled import entry_of
 from ftcc.link.gate import Ended, Gate, Ready, Said
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint, ending_message, ends
 from ftcc.link.process import Setting, Stall, Waiter
@@ -101,6 +102,7 @@ class Crew:
         mesh = self.neighbourhood.fileno() if setting.lockstep else -1
         connect(self.group.wire, self.vehicles, self.waiter.fileno(), mesh)
         self.stall = Stall()
+        self._fly = entry_of(self.flight.fly, self.group, self.timing, setting.lockstep)
 
     def seat(self, i: int) -> Seat:
         """What the ground may see and touch of autopilot ``i``."""
@@ -141,7 +143,7 @@ class Crew:
                 self.attend()
             if self.gate.stopping:
                 break
-            cause = self.flight.fly(self.group, self.timing, self.setting.lockstep)
+            cause = self._fly(self.group, self.timing, self.setting.lockstep)
         self.end()
 
     # What is to be done after a tick.

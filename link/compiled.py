@@ -33,6 +33,7 @@ __all__ = [
     "compiled_to_wait",
     "compiled_within",
     "copy",
+    "entry_of",
     "external",
     "fields",
     "fill",
@@ -111,6 +112,17 @@ def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:
         return substitute
 
     return register
+
+
+def entry_of(function: Any, *arguments: Any) -> Any:
+    """The compiled ``function`` for arguments of these types, which must have been called with such before.
+
+    It is called without a look at the types of what it is given, which takes longer than a tick where that is tuples of
+    a hundred arrays: so its caller must see to it that they are always the same. Plain Python is itself.
+    """
+    if not isinstance(function, Dispatcher):
+        return function
+    return function.get_overload(tuple(numba.typeof(argument) for argument in arguments))
 
 
 def refusal(function: Any, *arguments: Any) -> str:

@@ -14,6 +14,7 @@ from types import ModuleType
 import numpy as np
 
 from ftcc.link.actuators import in_slots, unit_of
+from ftcc.link.compiled import entry_of
 from ftcc.link.failures import Failure, failure_answer, read_failure
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
 from ftcc.link.happenings import drained
@@ -105,6 +106,7 @@ class Vehicles:
         connect(self.group.wire, self.pilots, self.waiter.fileno())
         self.stall = Stall()
         load_compiled(self.group, self.timing, self.flight)
+        self._fly = entry_of(self.flight.fly, self.group, self.timing, setting.lockstep)
 
     @property
     def tick(self) -> int:
@@ -136,7 +138,7 @@ class Vehicles:
                 self.stall.progress()
             self.complain()
             self.follow_the_gate()
-            cause = self.flight.fly(self.group, self.timing, self.setting.lockstep)
+            cause = self._fly(self.group, self.timing, self.setting.lockstep)
         self.recorder.close()
         late = int(self.group.late.sum())
         self.gate.tell(Ended(self.tick, late, self.tick * len(self.specs)))
