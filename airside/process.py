@@ -159,17 +159,13 @@ class Crew:
             self.recorder.write()
             self.link_recorder.write()
         if to_do & SECOND:
-            self.write_if_due(in_step=True)
+            self.recorder.write_if_due()
+            self.link_recorder.write_if_due()
         if to_do & NOTE:
             for at_us, uav, severity, text in told(self.group.autopilots, self.specs):
                 self.gate.tell(Said(severity, text, uav, at_us))
         if to_do & REPORT:
             self.report()
-
-    def write_if_due(self, in_step: bool) -> None:
-        """Write what has been recorded, where it is time."""
-        self.recorder.write_if_due(in_step)
-        self.link_recorder.write_if_due(in_step)
 
     def report(self) -> None:
         """Tell the ground what is due, and when something will be due next."""
@@ -209,7 +205,6 @@ class Crew:
             self.group.attention[0] = now + _ATTENTION
             for link in self.ground:
                 link.attend()
-            self.write_if_due(in_step=False)
             self.complain()
 
     def complain(self) -> None:

@@ -173,14 +173,13 @@ class Recorder:
             part.write(self.rows.values[i, : self.rows.filled[i]])
         self.rows.filled[:] = 0
 
-    def write_if_due(self, in_step: bool) -> None:
-        """Write where rows have waited for long, or where a UAV has filled its rows.
+    def write_if_due(self) -> None:
+        """Write what has waited for about a second of wall time.
 
-        Where a tick is ``in_step``, the same for all processes, a second of wall time is long enough: so what has been
-        written of a UAV by its two processes ends at the same instant, while they fly no faster than the clock.
+        To be called at ticks that are the same for all processes: so what its two processes have written of a UAV ends
+        at the same instant, while they fly no faster than the clock.
         """
-        waited = time.monotonic() - self._written
-        if waited > (_FLUSH if in_step else 2.0 * _FLUSH) or self.rows.filled.max() >= ROWS:
+        if time.monotonic() - self._written > _FLUSH:
             self.write()
 
     def close(self) -> None:

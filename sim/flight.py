@@ -14,6 +14,7 @@ from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, pause, wait
+from ftcc.link.timing import ticks_a_second
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, HELD, WORK
 from ftcc.link.wire import (
     BY_ACTUATORS,
@@ -250,6 +251,8 @@ def ask_again(group, wanted, now):
 def something_to_do(group, timing):
     """Whether Python has something to do after this tick: rows to write, losses and events to tell, truth to send."""
     if group.fleet.happenings.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
+        return True
+    if group.tick[0] % ticks_a_second(timing.period_us) == 0:
         return True
     return group.tick[0] == timing.ticks or is_full(group.rows)
 

@@ -20,7 +20,7 @@ from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
 from ftcc.link.happenings import drained
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, Endpoint, dialect, ending_message, ends, float_array
 from ftcc.link.process import Setting, Stall, Telemetry, Waiter
-from ftcc.link.recording import Column, Recorder, part_path
+from ftcc.link.recording import Column, Recorder, is_full, part_path
 from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, HELD, WORK
 from ftcc.link.wire import connect, keep_sent, send_again, split
@@ -206,7 +206,10 @@ class Vehicles:
     def work(self, tick: int) -> None:
         """Write rows, tell what happened, send the truth to the station."""
         now_us = tick * self.timing.period_us
-        self.recorder.write_if_due(in_step=tick % self.timing.report_every == 0)
+        if is_full(self.recorder.rows):
+            self.recorder.write()
+        if tick % self.timing.report_every == 0:
+            self.recorder.write_if_due()
         if self.group.fleet.happenings.used[0]:
             for at_us, i, _, number in drained(self.group.fleet.happenings):
                 uav = self.specs[i].uav

@@ -65,12 +65,12 @@ def test_a_recorder_writes_the_rows_that_each_uav_has_filled(tmp_path: Path) -> 
     rows.values[2, 0] = (0.0, 2, -1.0)
     rows.filled[2] = 1
     assert is_full(rows)
-    recorder.write_if_due(in_step=False)
+    recorder.write()
     assert rows.filled.tolist() == [0, 0, 0]
     rows.values[0, 0] = (5.0, 1, 7.0)
     rows.filled[0] = 1
-    recorder.write_if_due(in_step=True)
-    assert rows.filled[0] == 1, "neither full nor old"
+    recorder.write_if_due()
+    assert rows.filled[0] == 1, "not old"
     recorder.close()
     assert read_part(paths[0]).column("z").to_pylist() == [*map(float, range(ROWS)), 7.0]
     assert read_part(paths[1]).column("z").to_pylist() == [-1.0]
