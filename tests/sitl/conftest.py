@@ -144,8 +144,9 @@ def ftcc(environment: dict[str, str]) -> Callable[..., subprocess.CompletedProce
 
 
 def events(folder: Path) -> list[dict[str, object]]:
-    """The events of a run."""
-    return [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    """The events of a run by time, then by UAV: of what several report of one instant, any may be heard first."""
+    lines = (folder / "events.jsonl").read_text().splitlines()
+    return sorted(map(json.loads, lines), key=lambda event: (event["t"], event["uav"] or 0))
 
 
 def same_flight(one: Path, other: Path) -> bool:
