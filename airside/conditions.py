@@ -7,25 +7,7 @@ from typing import Any
 
 from ftcc.airside.scheme import Flight, Problem
 
-__all__ = ["above_leaders_climb", "largest_degree", "not_negative", "positive", "stable_in_steps"]
-
-
-def positive(gains: Any, names: str) -> list[Problem]:
-    """Every gain of ``names`` (separated by spaces) must be > 0."""
-    return [
-        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be > 0")
-        for name in names.split()
-        if not getattr(gains, name) > 0.0
-    ]
-
-
-def not_negative(gains: Any, names: str) -> list[Problem]:
-    """Every gain of ``names`` (separated by spaces) must be >= 0."""
-    return [
-        Problem(True, f"gain {name} = {getattr(gains, name):g}: must be >= 0")
-        for name in names.split()
-        if not getattr(gains, name) >= 0.0
-    ]
+__all__ = ["above_leaders_climb", "largest_degree", "stable_in_steps", "weighted"]
 
 
 def largest_degree(flight: Flight) -> float:
@@ -34,10 +16,19 @@ def largest_degree(flight: Flight) -> float:
     return max(sum(graph.weights.get((i, j), 0.0) for j in graph.uavs) for i in graph.followers)
 
 
+def weighted(name: str, degree: float) -> str:
+    """The name of a gain whose rate counts with the weights of the graph."""
+    return f"{name}, times {degree:g}, the largest sum of weights with which a UAV hears"
+
+
 def stable_in_steps(rates: Mapping[str, float], step: float) -> list[Problem]:
     """No rate (1/s, by the gain that sets it) may reach 2/step: explicit Euler steps of ``step`` seconds."""
     return [
-        Problem(True, f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {step * 1e3:g} ms")
+        Problem(
+            True,
+            f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {step * 1e3:g} ms: "
+            f"needs more than {rate / 2.0:.0f} steps a second (control rate times substeps, where there are some)",
+        )
         for name, rate in rates.items()
         if rate * step >= 2.0
     ]

@@ -13,12 +13,14 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.ranges import Range
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.link.compiled import width
 from ftcc.link.graph import Assumption, Graph
 
 __all__ = [
     "FAULT_TOLERANCE",
+    "FOLLOWED",
     "Flight",
     "Heard",
     "Problem",
@@ -39,7 +41,8 @@ class Quantity:
     """Name, unit and meaning of a number; used as annotation of gains and states and to list signals.
 
     ``published`` is the monograph's value of a gain, None where the monograph has none. ``bound`` names the signal
-    (or gives the constant) that limits this one, for display.
+    (or gives the constant) that limits this one, for display. ``follows`` names what of the mission a gain follows
+    unless it is given, see `FOLLOWED`.
     """
 
     name: str
@@ -47,6 +50,11 @@ class Quantity:
     meaning: str = ""
     published: float | None = None
     bound: float | str | None = None
+    follows: str = ""
+
+
+FOLLOWED = {"leaders.z": "mean altitude of the leaders at the start, m"}
+"""What gains may follow."""
 
 
 class Heard(NamedTuple):
@@ -106,8 +114,10 @@ _DEFAULTS: dict[str, Any] = {
     "PLANT": "longitudinal",
     "FORMS": {"flight": {}},
     "SWITCHES": {},
+    "RANGES": {},
     "check": lambda gains, flight: [],
     "climb_limit": lambda gains: math.inf,
+    "command_limits": lambda gains: {},
 }
 """What a file that does not say otherwise means."""
 
@@ -138,6 +148,9 @@ class Scheme:
                 raise SchemeError(
                     f"scheme {self.name}: states or outputs hold vectors; say with SIGNALS what is recorded"
                 )
+        strange = [name for name in self.ranges if name not in self.gains_type._fields]
+        if strange:
+            raise SchemeError(f"scheme {self.name}: RANGES name {', '.join(strange)}, which are no gains")
 
     def _require_quantities(self, kind: str, record: Any, names: Sequence[str]) -> None:
         missing = [name for name in names if name not in quantities(record)]
@@ -211,11 +224,41 @@ class Scheme:
         return self._declared("climb_limit")  # type: ignore[no-any-return]
 
     @property
-    def check(self) -> Callable[..., list[Problem]]:
-        return self._declared("check")  # type: ignore[no-any-return]
+    def command_limits(self) -> Callable[..., dict[str, tuple[float, float]]]:
+        """Of some gains: the least and largest command that the law itself gives, by actuator."""
+        return self._declared("command_limits")  # type: ignore[no-any-return]
 
-    def gains(self, form: str, overrides: Mapping[str, float]) -> Any:
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """By gain: the values that it may take; a gain that is not there may take any that is finite."""
+        return {name: allowed for allowed, names in self._declared("RANGES").items() for name in names.split()}
+
+    def check(self, gains: Any, flight: Flight) -> list[Problem]:
+        """What is wrong with gains: their ranges, and if nothing is, the scheme's own conditions."""
+        ranges = self.ranges
+        problems = [
+            Problem(True, f"gain {name} = {value:g}: {refusal}")
+            for name, value in gains._asdict().items()
+            if name in ranges and (refusal := ranges[name].refusal(value))
+        ]
+        return problems or [*self._untried(gains), *self._declared("check")(gains, flight)]
+
+    def _untried(self, gains: Any) -> list[Problem]:
+        known, ranges = quantities(self.gains_type), self.ranges
+        found = []
+        for name, value in gains._asdict().items():
+            flown = {known[name].published, *(form.get(name) for form in self.forms.values())} - {None}
+            remark = ranges[name].remark(value, flown) if name in ranges else ""
+            if remark:
+                found.append(Problem(False, f"gain {name} = {value:g}: {remark}"))
+        return found
+
+    def gains(
+        self, form: str, overrides: Mapping[str, float], followed: Mapping[str, float] = MappingProxyType({})
+    ) -> Any:
         """The gains of a form with overrides: published values, then the form's own, then ``overrides``.
+
+        A gain that follows one of ``followed`` (see `FOLLOWED`) takes its value from there, unless it is overridden.
 
         Raises
         ------
@@ -226,6 +269,9 @@ class Scheme:
             raise ValueError(f"scheme {self.name} has no form {form!r}; it has {', '.join(self.forms)}")
         known = quantities(self.gains_type)
         values = {name: note.published for name, note in known.items()} | self.forms[form]
+        for name, note in known.items():
+            if note.follows in followed:
+                values[name] = followed[note.follows]
         for name, value in overrides.items():
             if name not in known:
                 raise ValueError(f"scheme {self.name} has no gain {name!r}; it has {', '.join(known)}")

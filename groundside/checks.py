@@ -23,7 +23,6 @@ from ftcc.link.timing import Timing
 from ftcc.sim import plants
 from ftcc.sim.plant import GAMMA, TRUTH, V, X, Z
 from ftcc.sim.spec import VehicleSpec
-from ftcc.sim.trim import TrimError
 
 __all__ = [
     "IDEAL",
@@ -31,9 +30,9 @@ __all__ = [
     "briefings",
     "check_delays",
     "check_scheme",
+    "followed_by_gains",
     "gains_of",
     "graph_of",
-    "level_trim",
     "limits_of",
     "plant_of",
     "scheme_of",
@@ -43,6 +42,8 @@ __all__ = [
 IDEAL = "monograph"
 """The form with ideal exchange, which no processes can fly."""
 
+_NEGLIGIBLE = 1e-6
+"""Share of the largest weight that a UAV hears with, below which an edge is as good as none."""
 _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
 
@@ -197,7 +198,23 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
         findings.refuse(f"graph.edges: {error}")
         findings.stop_if_refused()
         raise
+    _warn_of_edges(graph, findings)
     return graph
+
+
+def _warn_of_edges(graph: Graph, findings: Findings) -> None:
+    """Say which edges and leaders are without effect."""
+    for (receiver, sender), weight in graph.weights.items():
+        if receiver in graph.leaders and sender in graph.followers:
+            findings.warned.append(f"graph.edges: {sender} -> {receiver} is without effect: leaders hear no followers")
+        elif weight < _NEGLIGIBLE * max(graph.weights[receiver, other] for other in graph.senders(receiver)):
+            findings.warned.append(
+                f"graph.edges: {sender} -> {receiver} has weight {weight:g}: as good as none beside the others that "
+                f"UAV {receiver} hears"
+            )
+    for leader in graph.leaders:
+        if not graph.receivers(leader):
+            findings.warned.append(f"graph.edges: nobody hears leader {leader}")
 
 
 def _require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Findings) -> None:
@@ -265,15 +282,11 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
                 )
 
 
-def level_trim(
-    plant: ModuleType, airframe: Any, V: float, where: str, findings: Findings, **disturbances: float
-) -> dict[str, float]:
-    """Level flight at ``V`` under disturbances, by name; refused, and nan, where there is none."""
-    try:
-        return dict(plant.level(airframe, V, **disturbances)._asdict())
-    except TrimError as error:
-        findings.refuse(f"{where}: {error}")
-        return dict.fromkeys(("alpha", *plant.ACTUATORS), math.nan)
+def followed_by_gains(plan: Plan) -> dict[str, float]:
+    """What of the mission gains follow unless they are given, see ``airside.scheme.FOLLOWED``."""
+    if not plan.leaders:
+        return {}
+    return {"leaders.z": math.fsum(leader.z for leader in plan.leaders.values()) / len(plan.leaders)}
 
 
 def gains_of(
@@ -284,6 +297,7 @@ def gains_of(
     ``switches`` are the scenario's unless given. Empty if they are refused.
     """
     plan = scenario.plan
+    followed = followed_by_gains(plan)
     switched: dict[str, float] = {}
     for name, on in (plan.switches if switches is None else switches).items():
         if name not in scheme.switches:
@@ -295,7 +309,7 @@ def gains_of(
 
     def complete(where: str, overrides: Mapping[str, float]) -> Any:
         try:
-            return scheme.gains(scenario.form, {**overrides, **switched})
+            return scheme.gains(scenario.form, {**overrides, **switched}, followed)
         except ValueError as error:
             findings.refuse(f"{where}: {error}")
             return None

@@ -6,8 +6,9 @@ import math
 from types import ModuleType
 
 from ftcc.airside.references.profiles import Profile
-from ftcc.groundside.checks import Findings, level_trim
+from ftcc.groundside.checks import Findings
 from ftcc.groundside.schema import FaultFields, Plan
+from ftcc.groundside.trims import disturbances_at, instants, level_trim, speeds_at
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import navigation
 from ftcc.sim.navigation import NavigationFault
@@ -75,21 +76,6 @@ def fault_text(fault: FaultFields) -> str:
     return f"{what} {fault.kind}"
 
 
-def _speed(plan: Plan, uav: int) -> float:
-    """The airspeed at which a UAV must be able to fly level: the mission's, or that of its start."""
-    if plan.mission is not None:
-        return plan.mission.V
-    own = plan.start.uav.get(uav, plan.start)
-    return own.V or plan.start.V or math.nan
-
-
-def _commanded_speeds(profiles: dict[int, Profile], at: float) -> set[float]:
-    """The speeds that the leaders are commanded to at ``at`` (s); none if they never change."""
-    if len({speed for p in profiles.values() for speed in (p.V, *(command.speed for command in p.commands))}) < 2:
-        return set()
-    return {[p.V, *(command.speed for command in p.commands if command.at <= at)][-1] for p in profiles.values()}
-
-
 def check_faults(
     plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
 ) -> None:
@@ -98,24 +84,17 @@ def check_faults(
     At the mission's speed, or every speed that leaders are commanded to while it lasts if they change theirs; under the
     disturbances that act then.
     """
-    changes = {command.at for p in profiles.values() for command in p.commands}
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
         if fault.actuator is None or fault.kind not in ("wrong", "off"):
             continue
         remaining = 0.0 if fault.kind == "off" else fault.effectiveness
         vehicle = by_uav[fault.uav]
-        own = _speed(plan, fault.uav)
         later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
-        end = min(later, default=math.inf)
         low, high = vehicle.limits[SLOT[fault.actuator]]
-        times = changes | {disturbance.time for disturbance in vehicle.disturbances}
-        instants = sorted({fault.at} | {t for t in times if fault.at < t < min(end, plan.duration)})
-        for at, speed in [(t, v) for t in instants for v in sorted(_commanded_speeds(profiles, t) or {own})]:
-            acting = {
-                name: sum(d.value for d in vehicle.disturbances if d.channel == channel and d.time <= at)
-                for channel, (name, _) in enumerate(plant.DISTURBANCES)
-            }
+        times = instants(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
+        for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:
+            acting = disturbances_at(vehicle, plant, at)
             steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
             needed = steady.get(fault.actuator, 0.0)
             command = (needed - fault.bias) / remaining if remaining > 0.0 else math.inf

@@ -150,9 +150,17 @@ def _faulty(t: Array, faults: Sequence[Fault], slot: int) -> tuple[Array, Array]
 
 
 def check_posts(
-    plan: Plan, references: Mapping[int, OwnReference], vehicles: Sequence[VehicleSpec], model: Any, findings: Findings
+    plan: Plan,
+    references: Mapping[int, OwnReference],
+    vehicles: Sequence[VehicleSpec],
+    laws: Mapping[int, Mapping[str, tuple[float, float]]],
+    model: Any,
+    findings: Findings,
 ) -> None:
-    """Refuse posts that collide or that their aircraft cannot fly, with quantity and limit; warn if it can narrowly."""
+    """Refuse posts that collide or that their aircraft cannot fly, with quantity and limit; warn if it can narrowly.
+
+    ``laws`` are the limits of each UAV's own law, by actuator; of two limits the tighter one holds.
+    """
     assert plan.fire is not None
     found = {v.uav: _needed(references[v.uav], v, model, plan.duration) for v in vehicles}
     _check_distances(plan.fire.least_distance, found, findings)
@@ -166,15 +174,23 @@ def check_posts(
                 f"{vehicle.guards.least_airspeed:g} m/s"
             )
         for actuator, demanded in needed.inputs.items():
-            _check_actuator(vehicle, actuator, demanded, needed, refuse, findings)
+            law = laws[vehicle.uav].get(actuator, (-math.inf, math.inf))
+            _check_actuator(vehicle, actuator, law, demanded, needed, refuse, findings)
         _check_start(vehicle, needed, findings)
 
 
 def _check_actuator(
-    vehicle: VehicleSpec, actuator: str, demanded: Array, needed: _Needed, refuse: Any, findings: Findings
+    vehicle: VehicleSpec,
+    actuator: str,
+    law: tuple[float, float],
+    demanded: Array,
+    needed: _Needed,
+    refuse: Any,
+    findings: Findings,
 ) -> None:
     slot, unit = SLOT[actuator], "" if unit_of(actuator) == "-" else f" {unit_of(actuator)}"
-    low, high = vehicle.limits[slot]
+    low, high = max(vehicle.limits[slot][0], law[0]), min(vehicle.limits[slot][1], law[1])
+    whose = "plant" if (low, high) == vehicle.limits[slot] else "law"
     effectiveness, bias = _faulty(needed.t, vehicle.faults, slot)
     if effectiveness.min() <= 0.0:
         findings.warned.append(f"UAV {vehicle.uav}: {actuator} loses all effectiveness")
@@ -187,7 +203,7 @@ def _check_actuator(
         if scale < 1.0 or shift != 0.0:
             text += f", the command ({demanded[worst]:.3g} - {shift:.3g})/{scale:.3g} = {value:.3g}{unit}"
         if not low < value < high:
-            refuse(f"{text}; allowed is {low:g} to {high:g}{unit} (fire.beyond_limits = true flies it all the same)")
+            refuse(f"{text}; the {whose} allows {low:g} to {high:g}{unit} (fire.beyond_limits = true flies it anyway)")
         elif abs(value - limit) < _NARROW * (high - low):
             findings.warned.append(f"{text}; close to its limit, {limit:g}{unit}")
 

@@ -22,9 +22,9 @@ from ftcc.groundside.checks import (
     briefings,
     check_delays,
     check_scheme,
+    followed_by_gains,
     gains_of,
     graph_of,
-    level_trim,
     limits_of,
     plant_of,
     scheme_of,
@@ -39,6 +39,7 @@ from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, PointMassSheet, RateLimits
 from ftcc.groundside.table import LEADING
+from ftcc.groundside.trims import check_starts, check_trims, level_trim
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
@@ -127,14 +128,17 @@ def resolve(scenario: Scenario) -> Mission:
     vehicles = [_aircraft(plan, uav, plant, true, limits, code, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
     findings.stop_if_refused()
+    check_starts(plan, plant, vehicles, findings)
+    gains = gains_of(scenario, scheme, findings)
     if plan.fire is None:
+        check_trims(plan, plant, vehicles, profiles, findings)
         check_faults(plan, plant, vehicles, profiles, findings)
-    else:
-        check_posts(plan, references, vehicles, model, findings)
+    elif gains:
+        laws = {uav: scheme.command_limits(own) for uav, own in gains.items()}
+        check_posts(plan, references, vehicles, laws, model, findings)
     if not wire and any(fault.navigation for fault in plan.faults):
         findings.refuse(f"faults: form {scenario.form} measures without a navigation solution that could fail")
 
-    gains = gains_of(scenario, scheme, findings)
     flight = None
     if gains:
         flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
@@ -262,11 +266,11 @@ def _aircraft(
             start[name] = 1.0
     true = plant.Parameters(*airframe)
     steady = level_trim(plant, true, start["V"], f"start of UAV {uav}", findings)
+    initial = (math.nan,) * len(plant.State._fields)
     try:
-        initial = tuple(plant.initial(start, steady))
+        initial = tuple(plant.initial(start, steady)) if steady else initial
     except ValueError as error:
         findings.refuse(f"start of UAV {uav}: {error}")
-        initial = (math.nan,) * len(plant.State._fields)
     noise, throttle = plan.noise, plan.plant.autothrottle
     channels = [name for name, _ in plant.DISTURBANCES]
     return VehicleSpec(
@@ -389,12 +393,17 @@ def _versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in _VERSIONED} | {"python": platform.python_version()}
 
 
+def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
+    gains = scheme.gains(scenario.form, scenario.plan.gains.common, followed_by_gains(scenario.plan))
+    return gains._asdict()  # type: ignore[no-any-return]
+
+
 def _as_flown(scenario: Scenario, scheme: Scheme) -> str:
     """The merged scenario with seed, versions, and every gain by value: a later default must not change it."""
     document = {key: value for key, value in scenario.document.items() if key != "flown"}
     document["seed"] = scenario.plan.seed
     gains = document.get("gains", {})
-    document["gains"] = gains | scheme.gains(scenario.form, scenario.plan.gains.common)._asdict()
+    document["gains"] = gains | _all_gains(scenario, scheme)
     document["flown"] = {
         "name": scenario.name,
         "form": scenario.form,

@@ -223,12 +223,16 @@ def _gains(seat: Seat) -> Iterator[Parameter]:
                 raise RefusedError(fatal[0])
         seat.autopilots.gains[seat.i] = in_force
 
+    ranges = seat.scheme.ranges
+
     def gain(name: str, announced: str, meaning: str) -> Parameter:
+        least, most = (ranges[name].least, ranges[name].most) if name in ranges else (-_ANY, _ANY)
+
         def write(value: float) -> None:
             bring_into_force(given | {name: value}, seat.fault_tolerance)
             given[name] = value
 
-        return Parameter(announced, lambda: given[name], write, -_ANY, _ANY, meaning=meaning)
+        return Parameter(announced, lambda: given[name], write, max(least, -_ANY), min(most, _ANY), meaning=meaning)
 
     capitals = [name.upper() for name in names]
     for name, note in quantities(seat.scheme.gains_type).items():

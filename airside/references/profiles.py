@@ -407,5 +407,5 @@ def largest_acceleration(profiles: Mapping[int, Profile], duration: float) -> fl
     """Largest acceleration of the leaders along either axis, m/s^2, on a grid of 0.1 s."""
     found = [0.0]
     for row in sampled(profiles, duration, 0.1).values():
-        found += [float(np.abs(row[:, 5]).max()), float(np.abs(np.diff(row[:, 6])).max()) / 0.1]
-    return max(found)
+        found += [*np.abs(row[:, 5]).tolist(), *(np.abs(np.diff(row[:, 6])) / 0.1).tolist()]
+    return float(max(found))

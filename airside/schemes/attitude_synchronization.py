@@ -27,6 +27,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside import ranges
 from ftcc.airside.attitude_model import (
     attitude_error,
     body_rate_model,
@@ -36,7 +37,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import positive
+from ftcc.airside.conditions import largest_degree
 from ftcc.airside.elements.filters import (
     butterworth,
     robust_exact_differentiator_step,
@@ -121,6 +122,25 @@ class Gains(NamedTuple):
     k_zeta: Annotated[float, Q("k_zeta", "-", "coupling into the second auxiliary system (not in paper)", 1.0)]
     lag: Annotated[float, Q("lag", "rad/s", "surfaces' bandwidth that lead and observer assume, 0: none", 0.0)]
     dynamic_surface: Annotated[float, Q("dynamic_surface", "-", "1: the traditional law", 0.0)]
+
+
+RANGES = {
+    ranges.WEIGHT: "lambda1",
+    ranges.COUPLING: "lambda2 tau1 tau2 k_zeta",
+    ranges.LAYER: "k_up k_lo eps0 eps_inf h11 h12 h21 h22 phi_s",
+    ranges.FREQUENCY: "nu w_u",
+    ranges.FEEDBACK: "k11_mu k11_alpha k11_beta k21_p k21_q k21_r h13 h14 h15",
+    ranges.FINITE_TIME: "k12_mu k12_alpha k12_beta k22_p k22_q k22_r",
+    ranges.EXPONENT: "upsilon",
+    ranges.ADAPTATION: "k13 k23",
+    ranges.LEAK: "k14 k24",
+    ranges.STEPS: "substeps",
+    ranges.INNER_SHARE: "edge",
+    ranges.OPTIONAL_FREQUENCY: "neighbour_filter observer lag",
+    ranges.TIME: "oldest",
+    ranges.SWITCH: "feed_forward dynamic_surface",
+    ranges.LIMIT_OR_OFF: "cap1 cap2",
+}
 
 
 class State(NamedTuple):
@@ -225,6 +245,8 @@ SWITCHES = {
 
 _LEAST_AIRSPEED = 3.0
 """Airspeed guard, m/s."""
+_STEEPEST = 42.0
+"""Largest phi / (k eps_inf) at which the law was flown with success in both forms, 1/rad."""
 _LARGEST_SIDESLIP = math.radians(80.0)
 """Sideslip guard in the kinematics, rad."""
 _RATE_FILTER = 0.02
@@ -492,21 +514,21 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    names = (
-        "lambda1 k_up k_lo eps0 eps_inf nu k11_mu k11_alpha k11_beta k21_p k21_q k21_r upsilon h11 h12 h13 h14 h15 h21 "
-        "h22 phi_s w_u substeps"
-    )
-    problems = positive(gains, names)
-    if not 0.0 < gains.upsilon < 1.0:
-        problems.append(Problem(True, f"gain upsilon = {gains.upsilon:g}: must lie between 0 and 1"))
+    problems = []
     if gains.eps0 < gains.eps_inf:
         problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
-    if not 0.0 < gains.edge < 1.0:
-        problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
-    if gains.substeps != int(gains.substeps):
-        problems.append(Problem(True, f"gain substeps = {gains.substeps:g}: must be a whole number"))
-    elif gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
+    if gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
         problems.append(Problem(False, f"gain substeps = {gains.substeps:g}: odd numbers make the rudder chatter"))
+    phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)
+    steepness = phi * (1.0 / gains.k_lo + 1.0 / gains.k_up) / (2.0 * gains.eps_inf)
+    if steepness > _STEEPEST:
+        problems.append(
+            Problem(
+                False,
+                f"phi / (k eps_inf) = {steepness:.1f} 1/rad with the graph's weights: the funnel is held up to "
+                f"{_STEEPEST:g}, and control is lost from 58 on; widen eps_inf or lower lambda1, lambda2",
+            )
+        )
     degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
     if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
         problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))

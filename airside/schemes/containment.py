@@ -20,7 +20,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import above_leaders_climb, largest_degree, not_negative, positive, stable_in_steps
+from ftcc.airside import ranges
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, stable_in_steps, weighted
 from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
 from ftcc.airside.elements.neighbours import disagreement
 from ftcc.airside.elements.observers import disturbance_observer_rate, sliding_mode_observer
@@ -66,7 +67,29 @@ class Gains(NamedTuple):
     horizon: Annotated[float, Q("horizon", "s", "longest extrapolation of a neighbour (not in paper)", 0.0)]
     substeps: Annotated[float, Q("n", "-", "Euler steps per tick", 1.0)]
     in_flight: Annotated[float, Q("in_flight", "-", "1: start from the present state; 0: the published zeros", 0.0)]
-    z_start: Annotated[float, Q("z_start", "m", "altitude assumed of everybody at the published start", 1000.0)]
+    z_start: Annotated[
+        float, Q("z_start", "m", "altitude at which the own estimate starts", 1000.0, follows="leaders.z")
+    ]
+    z_unheard: Annotated[
+        float, Q("z_unheard", "m", "altitude assumed of a neighbour not heard yet", 1000.0, follows="leaders.z")
+    ]
+
+
+RANGES = {
+    ranges.FEEDBACK: "k11 k21 k31 k41 k51 k22 k42 k52 beta1",
+    ranges.COUPLING: "k12 beta2",
+    ranges.FILTER_TIME: "e1 e2",
+    ranges.DAMPING: "l1 l2",
+    ranges.LAYER: "phi",
+    ranges.SHARE: "kappa",
+    ranges.SWITCH: "observers auxiliary acting in_flight",
+    ranges.OPTIONAL_FREQUENCY: "shaper",
+    ranges.LIMIT: "v_max a_max",
+    ranges.LIMIT_OR_OFF: "guard",
+    ranges.TIME: "horizon",
+    ranges.STEPS: "substeps",
+    ranges.ALTITUDE: "z_start z_unheard",
+}
 
 
 class State(NamedTuple):
@@ -152,6 +175,10 @@ SWITCHES = {
     "fault_tolerance": {"observers": 0.0, "auxiliary": 0.0, "guard": 0.0},
 }
 
+_FARTHEST_START = 100.0
+"""From the altitude at which the estimates start: from 200 m on followers end up to 70 m off, m."""
+_FARTHEST_UNSHAPED = 1.0
+"""Likewise without the shaper, m."""
 _LEAST_AIRSPEED = 10.0
 """Airspeed guard in every division, m/s."""
 
@@ -191,7 +218,7 @@ def _substep(s, own, heard, reference, model, gains, h, ahead):
     zeta2 = gains.auxiliary * s.zeta2
 
     # Distributed observer (5.12) and shaper.
-    total, weights, rates = disagreement(s.zhat, heard, ahead, gains.horizon, gains.z_start, gains.in_flight)
+    total, weights, rates = disagreement(s.zhat, heard, ahead, gains.horizon, gains.z_unheard, gains.in_flight)
     zhat_rate, slope = sliding_mode_observer(total, gains.beta1, gains.beta2, gains.phi)
     if gains.shaper > 0.0:
         z_ref, v_ref, a_ref = s.z_r, s.v_r, s.a_r
@@ -325,12 +352,26 @@ def climb_limit(gains: Gains) -> float:
     return min(gains.beta2, gains.v_max) if gains.shaper > 0.0 else gains.beta2
 
 
+def _starts(gains: Gains, flight: Flight) -> list[Problem]:
+    """Whether the published start, from zeros and ``z_start``, is near enough to that of the aircraft."""
+    problems = []
+    for uav, initial in flight.initial.items():
+        away = initial.z - gains.z_start
+        text = f"UAV {uav} starts at z = {initial.z:g} m, {away:+g} m from the estimate's start (gain z_start)"
+        if abs(away) > _FARTHEST_START:
+            problems.append(
+                Problem(True, f"{text}: at most {_FARTHEST_START:g} m can be flown; in_flight = 1 starts where it is")
+            )
+        elif abs(away) > _FARTHEST_UNSHAPED and gains.shaper == 0.0:
+            problems.append(Problem(False, f"{text}: without the shaper, aircraft were lost from 5 m on"))
+    return problems
+
+
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = [*positive(gains, "k11 k21 k31 k41 k51 k22 k42 k52 e1 e2 l1 l2 beta1 phi"), *not_negative(gains, "k12")]
-    if gains.substeps < 1.0 or gains.substeps != int(gains.substeps):
-        return [*problems, Problem(True, f"gain substeps = {gains.substeps}: must be a whole number >= 1")]
-    problems += above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")
+    problems = above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")
+    if gains.in_flight == 0.0:
+        problems += _starts(gains, flight)
     if flight.leader_speed_varies:
         problems.append(
             Problem(True, "the leaders' speed must be constant and the mission's, as which followers know it")
@@ -338,9 +379,9 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     h = flight.period / gains.substeps
     degree = largest_degree(flight)
     rates = {
-        "e1": 1.0 / max(gains.e1, 1e-9),
-        "e2": 1.0 / max(gains.e2, 1e-9),
-        "beta1, beta2 / phi": degree * (gains.beta1 + gains.beta2 / max(gains.phi, 1e-9)),
+        "e1": 1.0 / gains.e1,
+        "e2": 1.0 / gains.e2,
+        weighted("beta1, beta2 / phi", degree): degree * (gains.beta1 + gains.beta2 / gains.phi),
         "k42": gains.k42,
         "k41": gains.k41,
     }

@@ -22,6 +22,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside import ranges
 from ftcc.airside.attitude_model import (
     attitude_drift,
     attitude_error,
@@ -32,7 +33,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree, positive, stable_in_steps
+from ftcc.airside.conditions import largest_degree, stable_in_steps
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
@@ -54,7 +55,7 @@ from ftcc.airside.model import Model, clip
 from ftcc.airside.references.attitude import Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
 from ftcc.link.compiled import Room, Vector, compiled
-from ftcc.link.graph import Assumption
+from ftcc.link.graph import Assumption, GraphError
 
 __all__ = ["Gains", "Output", "State", "check", "observe", "share", "start", "step"]
 
@@ -102,6 +103,22 @@ class Gains(NamedTuple):
     oldest: Annotated[float, Q("oldest", "s", "age at which a neighbour is dropped, 0: held (not in paper)", 0.5)]
     edge: Annotated[float, Q("edge", "-", "share of the bound that the transform sees (not in paper)", 0.95)]
     rate_limit: Annotated[float, Q("rate_limit", "rad/s", "largest rate command (not in paper)", 10.0)]
+
+
+RANGES = {
+    ranges.WEIGHT: "lambda1",
+    ranges.COUPLING: "lambda2 k3 k10",
+    ranges.LAYER: "k_up k_lo eps0 eps_inf r1 r2 mu1_floor mu2_floor",
+    ranges.FREQUENCY: "iota w_u",
+    ranges.FEEDBACK: "k1 k2 k4_mu k4_alpha k4_beta k5 k8 k9 k11_p k11_q k11_r k12",
+    ranges.ADAPTATION: "k6 k13",
+    ranges.LEAK: "k7 k14",
+    ranges.FILTER_TIME: "tau",
+    ranges.SWITCH: "observer1 observer2 nominal derivatives",
+    ranges.TIME: "oldest",
+    ranges.INNER_SHARE: "edge",
+    ranges.LIMIT: "rate_limit",
+}
 
 
 class State(NamedTuple):
@@ -176,7 +193,7 @@ SIGNALS = (
     Q("elevator_wanted", "rad", "elevator before its limits"),
     Q("rudder_wanted", "rad", "rudder before its limits"),
 )
-GRAPH = Assumption.STRONGLY_CONNECTED
+GRAPH = Assumption.NONE
 COMMANDS = ("aileron", "elevator", "rudder")
 PLANT = "attitude"
 FORMS: dict[str, dict[str, float]] = {"flight": {}, "monograph": {}}
@@ -376,15 +393,15 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    names = (
-        "lambda1 k_up k_lo eps0 eps_inf iota k1 k2 k4_mu k4_alpha k4_beta k5 r1 r2 k8 k9 k11_p k11_q k11_r k12 "
-        "mu1_floor mu2_floor tau w_u rate_limit"
-    )
-    problems = positive(gains, names)
+    problems = []
     if gains.eps0 < gains.eps_inf:
         problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
-    if not 0.0 < gains.edge < 1.0:
-        problems.append(Problem(True, f"gain edge = {gains.edge:g}: must lie between 0 and 1"))
+    try:
+        flight.graph.require(Assumption.STRONGLY_CONNECTED)
+    except GraphError as error:
+        problems.append(
+            Problem(False, f"graph.edges: {error}; sound all the same, as every UAV knows its own reference")
+        )
     problems += stable_in_steps({name: getattr(gains, name) for name in ("k1", "k2", "k8", "k9")}, flight.period)
     if not any(problem.fatal for problem in problems):
         phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)

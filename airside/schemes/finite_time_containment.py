@@ -22,7 +22,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import largest_degree, not_negative, positive, stable_in_steps
+from ftcc.airside import ranges
+from ftcc.airside.conditions import largest_degree, stable_in_steps, weighted
 from ftcc.airside.elements.filters import butterworth, sliding_mode_differentiator
 from ftcc.airside.elements.neighbours import motion_sums
 from ftcc.airside.elements.networks import adaptation_step, diagonal_energy, learned_gain
@@ -108,6 +109,22 @@ class Gains(NamedTuple):
     ]
     growth: Annotated[float, Q("growth", "-", "1: neighbours move on within a tick (not in paper)", 0.0)]
     prediction: Annotated[float, Q("prediction", "-", "1: one-sample prediction (not in paper)", 0.0)]
+
+
+RANGES = {
+    ranges.FEEDBACK: "beta1 beta2 beta3 beta4 k11 k21 k22 k31 k41 k51 k61 k62 mu1 mu2",
+    ranges.EXPONENT: "a r",
+    ranges.LAYER: "kappa nu1 nu2 width",
+    ranges.FINITE_TIME: "b1 b2 b3 b4 b5 b6",
+    ranges.WEIGHT: "z11 z12 z21 z22 z31 z32 z41 z42",
+    ranges.ADAPTATION: "g11 g12 g21 g22 g31 g32 g41 g42",
+    ranges.LEAK: "h11 h12 h21 h22 h31 h32 h41 h42",
+    ranges.FREQUENCY: "low_pass",
+    ranges.SWITCH: "auxiliary adapt_thrust adapt_elevator guards extrapolation growth prediction",
+    ranges.TIME: "adapt_until",
+    ranges.LIMIT: "cap1 cap2 cap4",
+    ranges.STEPS: "substeps",
+}
 
 
 class State(NamedTuple):
@@ -381,24 +398,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = positive(
-        gains,
-        "beta1 beta2 beta3 beta4 kappa k11 k21 k22 k31 k41 k51 k61 k62 z11 z12 z21 z22 z31 z32 z41 z42 nu1 nu2 mu1 "
-        "mu2 width low_pass",
-    )
-    problems += not_negative(gains, "g11 g12 g21 g22 g31 g32 g41 g42 h11 h12 h21 h22 h31 h32 h41 h42")
-    for name in ("a", "r"):
-        if not 0.0 < getattr(gains, name) < 1.0:
-            problems.append(
-                Problem(True, f"gain {name} = {getattr(gains, name):g}: an exponent of a finite-time term is in (0, 1)")
-            )
-    for name in ("b1", "b2", "b3", "b4", "b5", "b6"):
-        if getattr(gains, name) < 0.0:
-            problems.append(Problem(True, f"gain {name} = {getattr(gains, name):g}: must be >= 0"))
-    if gains.substeps < 1.0 or gains.substeps != int(gains.substeps):
-        problems.append(Problem(True, f"gain substeps = {gains.substeps:g}: must be a whole number >= 1"))
-    if problems:
-        return problems
+    problems = []
     if gains.beta4 <= flight.leader_acceleration:
         problems.append(
             Problem(
@@ -407,11 +407,13 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 f"{flight.leader_acceleration:.3f} m/s^2 (Lemma 6.6)",
             )
         )
-    steepness = largest_degree(flight) / gains.kappa
-    rates = {"beta4 / kappa": gains.beta4 * steepness, "beta2 / kappa": gains.beta2 * steepness}
+    degree = largest_degree(flight)
+    rates = {
+        weighted("beta4 / kappa", degree): degree * gains.beta4 / gains.kappa,
+        weighted("beta2 / kappa", degree): degree * gains.beta2 / gains.kappa,
+        "low_pass": gains.low_pass,
+    }
     problems += stable_in_steps(rates, flight.period / gains.substeps)
-    if gains.guards > 0.0:
-        problems += positive(gains, "cap1 cap2 cap4")
     if flight.period > (0.01 if gains.prediction > 0.0 else 0.008):
         problems.append(
             Problem(

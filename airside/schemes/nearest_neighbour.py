@@ -23,7 +23,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import not_negative, positive, stable_in_steps
+from ftcc.airside import ranges
+from ftcc.airside.conditions import stable_in_steps
 from ftcc.airside.elements.actuators import leading_command, modelled_position
 from ftcc.airside.elements.filters import first_order_rate, second_order_reference_step
 from ftcc.airside.elements.neighbours import weighted_average
@@ -67,6 +68,20 @@ class Gains(NamedTuple):
     horizon: Annotated[float, Q("horizon", "s", "longest extrapolation of a neighbour (not in paper)", 2.0)]
     lead: Annotated[float, Q("lead", "rad/s", "apparent actuator bandwidth, 0: off (not in paper)", 0.0)]
     rate_filter: Annotated[float, Q("T_a", "s", "low-pass of the acceleration sent, 0: off (not in paper)", 0.0)]
+
+
+RANGES = {
+    ranges.FEEDBACK: "k11 k12 k21 k31 k32 k42 k51 k52",
+    ranges.FILTER_TIME: "tau1 tau2 tau3",
+    ranges.SWITCH: "observers auxiliary accelerometer",
+    ranges.ANGLE_LIMIT: "gamma_limit alpha_limit",
+    ranges.LIMIT_OR_OFF: "q_limit",
+    ranges.OPTIONAL_FREQUENCY: "filter_frequency lead",
+    ranges.DAMPING: "filter_damping",
+    ranges.LIMIT: "oldest",
+    ranges.TIME: "horizon",
+    ranges.OPTIONAL_TIME: "rate_filter",
+}
 
 
 class State(NamedTuple):
@@ -350,13 +365,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = positive(gains, "k11 k12 k21 k31 k32 k42 k51 k52 tau1 tau2 tau3 oldest filter_damping")
-    problems += not_negative(
-        gains,
-        "observers auxiliary accelerometer gamma_limit alpha_limit q_limit filter_frequency horizon lead rate_filter",
-    )
-    if problems:
-        return problems
+    problems = []
     if gains.k32 < 5.9:
         problems.append(
             Problem(

@@ -24,7 +24,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import above_leaders_climb, largest_degree, not_negative, positive, stable_in_steps
+from ftcc.airside import ranges
+from ftcc.airside.conditions import above_leaders_climb, largest_degree, stable_in_steps, weighted
 from ftcc.airside.elements.actuators import lead_filter
 from ftcc.airside.elements.filters import butterworth, complementary_rate, first_order_rate, limited_tracker
 from ftcc.airside.elements.neighbours import disagreement
@@ -98,7 +99,32 @@ class Gains(NamedTuple):
     anti_windup: Annotated[float, Q("anti_windup", "-", "1: conditional integration of speed (not in paper)", 0.0)]
     horizon: Annotated[float, Q("horizon", "s", "longest extrapolation of a neighbour (not in paper)", 0.0)]
     in_flight: Annotated[float, Q("in_flight", "-", "1: estimates start at the own altitude; 0: at z_start", 0.0)]
-    z_start: Annotated[float, Q("z_start", "m", "altitude assumed of everybody at the start", 1000.0)]
+    z_start: Annotated[
+        float, Q("z_start", "m", "altitude at which the own estimate starts", 1000.0, follows="leaders.z")
+    ]
+    z_unheard: Annotated[
+        float, Q("z_unheard", "m", "altitude assumed of a neighbour not heard yet", 1000.0, follows="leaders.z")
+    ]
+
+
+RANGES = {
+    ranges.FEEDBACK: "k11 beta1 k21 k31 k41 k51 k52",
+    ranges.COUPLING: "k12 k13 beta2",
+    ranges.LAYER: "phi tube_first tube_last kl ku mu inner",
+    ranges.FREQUENCY: "tube_decay network_filter servo",
+    ranges.FILTER_TIME: "tau1 tau2 tau3",
+    ranges.WEIGHT: "w21 w22 w23 w41 w42 w43",
+    ranges.ADAPTATION: "g11 g21",
+    ranges.LEAK: "w24 w44",
+    ranges.SWITCH: "networks auxiliary xi_term anti_windup in_flight",
+    ranges.OPTIONAL_FREQUENCY: "estimator smoother altitude_filter",
+    ranges.OPTIONAL_TIME: "lead_slow lead_fast rate_filter",
+    ranges.LIMIT: "a_max",
+    ranges.LIMIT_OR_OFF: "observer_limit q_limit cap",
+    ranges.ANGLE_LIMIT: "gamma_limit theta_limit",
+    ranges.TIME: "horizon",
+    ranges.ALTITUDE: "z_start z_unheard",
+}
 
 
 class State(NamedTuple):
@@ -338,7 +364,7 @@ def _capped(estimate: float, cap: float) -> float:
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
     """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output."""
     s = state
-    total, _, _ = disagreement(s.z_d, heard, 0.0, gains.horizon, gains.z_start, gains.in_flight)
+    total, _, _ = disagreement(s.z_d, heard, 0.0, gains.horizon, gains.z_unheard, gains.in_flight)
     V_rate = (own.V - s.V_before) / dt
     law = _evaluate(s, own, total, V_rate, reference, model, gains)
 
@@ -408,18 +434,7 @@ def climb_limit(gains: Gains) -> float:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = positive(
-        gains,
-        "k11 beta1 phi tube_first tube_last tube_decay kl ku k21 k31 k41 k51 k52 tau1 tau2 tau3 w21 w22 w23 w41 "
-        "w42 w43 mu network_filter inner servo",
-    )
-    problems += not_negative(
-        gains,
-        "k12 k13 g11 g21 w24 w44 beta2 networks auxiliary xi_term estimator lead_slow lead_fast observer_limit "
-        "rate_filter smoother a_max altitude_filter gamma_limit theta_limit q_limit cap horizon",
-    )
-    if problems:
-        return problems
+    problems = []
     if gains.tube_first < gains.tube_last:
         problems.append(Problem(True, "gain tube_first: the tube must not widen, epsilon(0) >= epsilon(inf)"))
     problems += above_leaders_climb(gains, "beta2", flight, "Theorem 3.1")
@@ -451,8 +466,9 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 )
             )
     h = flight.period
+    degree = largest_degree(flight)
     rates = {
-        "beta1, beta2 / phi": largest_degree(flight) * (gains.beta1 + gains.beta2 / gains.phi),
+        weighted("beta1, beta2 / phi", degree): degree * (gains.beta1 + gains.beta2 / gains.phi),
         "tau1": 1.0 / gains.tau1,
         "tau2": 1.0 / gains.tau2,
         "tau3": 1.0 / gains.tau3,

@@ -145,6 +145,7 @@ class Plant(Strict):
         "delay the first command counts as all that came before it",
     )
     guards: Guards = Guards()
+    beyond_limits: bool = Field(False, description="true: fly although a healthy aircraft has no level trim in travel")
 
 
 class Start(Strict):

@@ -25,6 +25,8 @@ class EdgeFields(Strict):
         directed = (self.sender is not None, self.receiver is not None)
         if both == any(directed) or any(directed) != all(directed):
             raise ValueError("needs either between = [a, b], or from = a and to = b")
+        if len({*(self.between or (self.sender, self.receiver))}) == 1:
+            raise ValueError("a UAV cannot be its own neighbour")
         return self
 
     @property

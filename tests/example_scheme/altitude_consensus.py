@@ -6,7 +6,7 @@ loops; integrators find the trim that a fault or a disturbance has moved.
 
 from typing import Annotated, NamedTuple
 
-from ftcc.airside.conditions import positive
+from ftcc.airside import ranges
 from ftcc.airside.model import clip
 from ftcc.airside.scheme import Quantity
 from ftcc.link.compiled import compiled
@@ -43,6 +43,7 @@ SHARED = {"follower": (Q("z_r", "m", "altitude reference"),), "leader": (Q("z", 
 GRAPH = Assumption.LEADERS_REACH_ALL
 COMMANDS = ("thrust", "elevator")
 SWITCHES = {"fault_tolerance": {"k_I": 0.0}}
+RANGES = {ranges.FEEDBACK: "k_c k_z k_theta k_q k_V", ranges.COUPLING: "k_I", ranges.LIMIT: "climb"}
 
 
 @compiled
@@ -70,7 +71,3 @@ def step(s, own, heard, reference, model, gains, dt):
 @compiled
 def share(state, own, reference, output, gains):
     return (state.z_r,)
-
-
-def check(gains, flight):
-    return positive(gains, "k_c k_z k_theta k_q k_V climb")
