@@ -247,7 +247,8 @@ class Scheme:
         known, ranges = quantities(self.gains_type), self.ranges
         found = []
         for name, value in gains._asdict().items():
-            flown = {known[name].published, *(form.get(name) for form in self.forms.values())} - {None}
+            values = (known[name].published, *(form.get(name) for form in self.forms.values()))
+            flown = [one for one in values if one is not None]
             remark = ranges[name].remark(value, flown) if name in ranges else ""
             if remark:
                 found.append(Problem(False, f"gain {name} = {value:g}: {remark}"))

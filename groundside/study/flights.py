@@ -9,6 +9,7 @@ import functools
 import multiprocessing
 import os
 import signal
+import threading
 import time
 import traceback
 import warnings
@@ -93,25 +94,72 @@ def fly_all(
         ProcessPoolExecutor, mp_context=context, initializer=_begin, initargs=(study, record_in, stop)
     )
     try:
-        # Compiled once here, or by every process at the same time.
-        timing = study.mission.timing._replace(ticks=0)
-        fly(dataclasses.replace(study.mission, timing=timing))
-        if ready is not None:
-            ready()
-        while trials:
-            for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report):
-                # A process died. Whose fault it was shows when each of those that were in flight flies alone.
-                for guilty in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report):
-                    report(Outcome(guilty, (), {}, 0.0, "its process died"))
+        with _heard_ctrl_c() as go_on:
+            return _fly_trials(study, trials, jobs, pool_of, report, ready, go_on)
     except KeyboardInterrupt:
         return False
     finally:
         stop.set()
+
+
+def _fly_trials(
+    study: Study,
+    trials: collections.deque[Trial],
+    jobs: int,
+    pool_of: Callable[[int], ProcessPoolExecutor],
+    report: Callable[[Outcome], None],
+    ready: Callable[[], None] | None,
+    go_on: Callable[[], None],
+) -> bool:
+    """Fly what `fly_all` has been given; True once all is flown."""
+    # Compiled once here, or by every process at the same time.
+    timing = study.mission.timing._replace(ticks=0)
+    fly(dataclasses.replace(study.mission, timing=timing))
+    go_on()
+    if ready is not None:
+        ready()
+    while trials:
+        for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report, go_on):
+            # A process died. Whose fault it was shows when each of those that were in flight flies alone.
+            for guilty in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report, go_on):
+                report(Outcome(guilty, (), {}, 0.0, "its process died"))
     return True
 
 
+@contextlib.contextmanager
+def _heard_ctrl_c() -> Iterator[Callable[[], None]]:
+    """Gives a function that raises KeyboardInterrupt if one was raised before and went unheard.
+
+    Python drops one that is raised in a destructor, and a flight that is interrupted only ends early. Outside of the
+    main thread there is none to hear.
+    """
+    came = False
+
+    def interrupt(*_: object) -> None:
+        nonlocal came
+        came = True
+        raise KeyboardInterrupt
+
+    def go_on() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield go_on
+        return
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield go_on
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _fly_in_pool(
-    pool: ProcessPoolExecutor, trials: collections.deque[Trial], jobs: int, report: Callable[[Outcome], None]
+    pool: ProcessPoolExecutor,
+    trials: collections.deque[Trial],
+    jobs: int,
+    report: Callable[[Outcome], None],
+    go_on: Callable[[], None],
 ) -> list[Trial]:
     """Fly the trials until none is left or a process dies; those that were in flight then."""
     flying: dict[Future[Outcome], Trial] = {}
@@ -121,6 +169,7 @@ def _fly_in_pool(
                 flying[_submit(pool, trials[0])] = trials[0]
                 trials.popleft()
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
+            go_on()
             for future in done:
                 outcome = future.result()
                 del flying[future]

@@ -34,13 +34,13 @@ def test_published_gains_are_within_their_ranges_and_unremarkable(scheme, form):
 
 @pytest.mark.parametrize(("scheme", "form"), CASES)
 def test_no_gain_ends_in_a_number_that_is_none_without_a_word(scheme, form):
-    """Each gain at 0, with the wrong sign, small, large and huge: refused, warned of, or two seconds of flight."""
-    mission = resolve(load(scheme, form=form, duration=2.0))
+    """Each gain at 0, with the wrong sign, large and huge: refused, warned of, or a second of flight."""
+    mission = resolve(load(scheme, form=form, duration=1.0))
     law, (follower, *_) = mission.scheme, mission.autopilots
     gains, told = law.gains_type(*follower.gains), set(mission.warnings)
     walked = 0
     for name, usual in gains._asdict().items():
-        for value in (0.0, -1.0, -usual, 1e-3, 1e2, 1e9):
+        for value in (0.0, -usual, 1e2, 1e9):
             problems = law.check(gains._replace(**{name: value}), follower.flight)
             if any(problem.fatal or problem.text not in told for problem in problems):
                 continue

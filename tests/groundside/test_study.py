@@ -126,7 +126,7 @@ def test_only_bounds_are_judged_where_the_settings_are_not_those_of_the_case(flo
 
 
 def test_an_aircraft_that_is_lost_is_told_and_fails_its_claims(scenario: Path) -> None:
-    settings = ["start.uav.1.gamma=1.2", "plant.guards.flight_path_angle=1.0"]
+    settings = ["start.uav.1.gamma=0.5", "plant.guards.flight_path_angle=0.501"]
     study = plan_study(scenario, settings=settings, duration=SECONDS)
     outcomes: list[Outcome] = []
     assert fly_all(study, 1, outcomes.append)
