@@ -11,9 +11,11 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import psutil  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ftcc.airside.autopilots import tick_of, told
+from ftcc.groundside.errors import UserError
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run
 from ftcc.groundside.table import write_table
@@ -26,12 +28,16 @@ from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import conditions_of, cycle_of, find
 
-__all__ = ["Flight", "PlainPython", "fly", "loop_of", "record", "simulate"]
+__all__ = ["Flight", "PlainPython", "TooLargeError", "fly", "loop_of", "record", "simulate"]
 
 _CHUNKS = 100
 """A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
 
 Progress = Callable[[float], None]
+
+
+class TooLargeError(UserError):
+    """A flight whose recording does not fit into memory."""
 
 
 class PlainPython(UserWarning):
@@ -135,6 +141,19 @@ class Flight:
         return table
 
 
+def _require_memory(mission: Mission) -> None:
+    """Refuse a flight whose recording does not fit into the free memory; while it is written it is there twice."""
+    timing, uavs = mission.timing, len(mission.uavs)
+    rows = timing.ticks // timing.record_every + 1
+    columns = 2 + len(TRUTH) + 2 * 4 + len(conditions_of(mission.plant)) + len(mission.scheme.signals)
+    needed, free = 2 * 8 * rows * uavs * columns, psutil.virtual_memory().available
+    if needed > free:
+        raise TooLargeError(
+            f"duration = {timing.duration:g}: {rows} rows of {uavs} UAVs take {needed / 1e9:.1f} GB of memory, "
+            f"{free / 1e9:.1f} GB are free; fly shorter, or lower record_rate"
+        )
+
+
 def loop_of(scheme: str, plant: str) -> ModuleType:
     """The flight of a scheme on a plant, see `flight_loop`: compiled, or plain Python if numba refuses the scheme."""
     tick = tick_of(scheme)
@@ -154,7 +173,13 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
         Called with the simulated time, s.
     ready : callable, optional
         Called once when everything is compiled, before the first tick.
+
+    Raises
+    ------
+    TooLargeError
+        If the recording does not fit into memory.
     """
+    _require_memory(mission)
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
     if loop.tick.REFUSAL:

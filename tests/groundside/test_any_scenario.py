@@ -1,7 +1,7 @@
 """Whatever stands in a scenario: it is refused with a sentence, or flies two seconds in numbers that are numbers.
 
-The values are those at the ends of what the schema allows, and plain ones between, alone and in pairs, in every field of
-every shipped scenario. ``FTCC_SCENARIOS`` says how many are tried.
+The values are those at the ends of what the schema allows, and plain ones between, alone and in pairs, in every field
+of every shipped scenario. ``FTCC_SCENARIOS`` says how many are tried.
 """
 
 from __future__ import annotations
@@ -114,9 +114,7 @@ def scenarios(draw: strategies.DrawFn) -> tuple[str, str, list[Change]]:
     return name, form, chosen
 
 
-@settings(
-    max_examples=TRIED, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck)
-)
+@settings(max_examples=TRIED, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
 @given(scenarios())
 def test_it_is_refused_with_a_sentence_or_flies(case: tuple[str, str, list[Change]]) -> None:
     name, form, changes = case
@@ -126,9 +124,15 @@ def test_it_is_refused_with_a_sentence_or_flies(case: tuple[str, str, list[Chang
         try:
             mission = resolve(load(name, form=form, settings=asked))
         except ScenarioError as error:
-            assert all(len(problem) > 20 for problem in error.problems), error.problems
-            return
-        ticks = min(mission.timing.ticks, round(SECONDS / mission.timing.period))
+            problems = error.problems
+        else:
+            problems = []
+    if problems:
+        assert all(len(problem) > 20 for problem in problems), problems
+        return
+    ticks = min(mission.timing.ticks, round(SECONDS / mission.timing.period))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         flight = fly(replace(mission, timing=mission.timing._replace(ticks=ticks)))
     for uav in mission.uavs:
         assert uav in flight.lost or np.isfinite(flight.column("z", uav)).all()
