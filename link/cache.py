@@ -6,6 +6,7 @@ one. This module imports neither numba nor numpy, so that what is kept can be ha
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import hashlib
 import importlib.metadata
@@ -14,11 +15,13 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["SCHEME_ENTRY_POINTS", "folder", "kept"]
+__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "kept"]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -27,8 +30,57 @@ _KEPT_CACHES = 6
 _PACKAGES = ("link", "sim", "airside")
 _LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
 """What the contents depend on beside the sources: pymavlink gives the layouts of messages."""
+_LOOK, _SILENT, _PATIENCE = 0.02, 3.0, 30.0
+"""A process that waits for another one that writes looks so often, tells so after so long, and then gives up, s."""
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+class CacheBusyError(OSError):
+    """Another process has been writing into the cache for too long: it hangs, or was stopped."""
+
+
+@contextmanager
+def alone(place: Path) -> Iterator[None]:
+    """Be the only process that writes into the folder ``place``.
+
+    The lock is the kernel's: who dies, however, lets go of it. Who waits says so on stderr, and for whom.
+
+    Raises
+    ------
+    CacheBusyError
+        If another process holds it for half a minute; what it does takes milliseconds.
+    """
+    place.mkdir(parents=True, exist_ok=True)
+    with (place / ".writing").open("a+", encoding="ascii") as file:
+        began = time.monotonic()
+        told = False
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                waited = time.monotonic() - began
+            if waited > _PATIENCE:
+                raise CacheBusyError(f"process {_holder(file)} has held {file.name} for {waited:.0f} s")
+            if waited > _SILENT and not told:
+                print(f"ftcc: waiting for process {_holder(file)}, which writes into {place}", file=sys.stderr)
+                told = True
+            time.sleep(_LOOK)
+        file.truncate(0)
+        file.write(str(os.getpid()))
+        file.flush()
+        try:
+            yield
+        finally:
+            # Said, not left to close(): a process forked meanwhile has the file open, too.
+            fcntl.flock(file, fcntl.LOCK_UN)
+
+
+def _holder(file: Any) -> str:
+    """Id of the process that holds a lock, as it wrote it there."""
+    file.seek(0)
+    return file.read() or "(unknown)"
 
 
 def _source_files() -> list[Path]:

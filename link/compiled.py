@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import itertools
 import math
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,6 +55,7 @@ os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from numba.core import types  # noqa: E402
+from numba.core.caching import IndexDataCacheFile  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import overload  # noqa: E402
@@ -93,7 +96,35 @@ def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
     settings = {"cache": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    return numba.njit(**settings)(function)  # type: ignore[no-any-return]
+    made = numba.njit(**settings)(function)
+    if isinstance(made, Dispatcher):
+        file = made._cache._cache_file
+        made._cache._cache_file = _CacheFile(file._cache_path, file._index_name[: -len(".nbi")], file._source_stamp)
+    return made  # type: ignore[no-any-return]
+
+
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
+    """Compiled code of one function on disk, to which several processes may add at a time.
+
+    numba's own way reads the index, picks the next free file and writes both, with nobody kept out meanwhile: of two
+    processes that compile one function for different types, one may leave an index that names the other's code. Such
+    code is called with arguments that it was not made for, and may do anything: crash, or never return.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Add the code ``data`` for the types ``key``; where that cannot be had, the next start compiles again."""
+        try:
+            with cache.alone(cache_folder):
+                overloads = self._load_index()
+                known = set(overloads.values())
+                free = (name for n in itertools.count(1) if (name := self._data_name(n)) not in known)
+                name = overloads.get(key) or next(free)
+                # The code first: nobody is to find in the index what is not there yet.
+                self._save_data(name, data)
+                if key not in overloads:
+                    self._save_index(overloads | {key: name})
+        except cache.CacheBusyError as busy:
+            warnings.warn(f"{self._index_name} is not kept: {busy}", RuntimeWarning, stacklevel=2)
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

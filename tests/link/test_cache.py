@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
+import subprocess
+import sys
+import threading
 
 import pytest
 
@@ -69,3 +74,56 @@ def test_plain_python_neither_keeps_nor_recalls(tmp_path, monkeypatch):
     asked = Asked(lambda: 1.5)
     assert (function(asked)(), function(asked)(), asked.times) == (1.5, 1.5, 2)
     assert not list(tmp_path.iterdir())
+
+
+# Several processes at one folder.
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from ftcc.link.cache import alone
+with alone(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60.0)
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that holds the folder, and would do so for a minute."""
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "held\n"
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_who_is_killed_while_it_writes_holds_nobody_up(tmp_path, holder):
+    entered = threading.Event()
+
+    def write():
+        with cache.alone(tmp_path):
+            entered.set()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    assert not entered.wait(0.3), "one at a time"
+    holder.send_signal(signal.SIGKILL)
+    writer.join(20.0)
+    assert entered.is_set()
+
+
+def test_who_waits_says_for_whom(tmp_path, holder, monkeypatch, capsys):
+    monkeypatch.setattr(cache, "_SILENT", 0.1)
+    monkeypatch.setattr(cache, "_PATIENCE", 0.3)
+    with pytest.raises(cache.CacheBusyError, match=f"process {holder.pid} has held"), cache.alone(tmp_path):
+        pass
+    said = capsys.readouterr().err
+    assert said.count(f"waiting for process {holder.pid}") == 1
+
+
+def test_what_is_done_alone_may_fail_and_lets_go(tmp_path):
+    with pytest.raises(ZeroDivisionError), cache.alone(tmp_path):
+        raise ZeroDivisionError
+    with cache.alone(tmp_path):
+        assert (tmp_path / ".writing").read_text() == str(os.getpid())

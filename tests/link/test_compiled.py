@@ -13,7 +13,20 @@ import numpy as np
 import pytest
 
 import ftcc.link
-from ftcc.link.compiled import Room, Vector, compiled, copy, fields, fill, instantiate, moved, store, width
+from ftcc.link import cache
+from ftcc.link.compiled import (
+    Room,
+    Vector,
+    _CacheFile,
+    compiled,
+    copy,
+    fields,
+    fill,
+    instantiate,
+    moved,
+    store,
+    width,
+)
 from tests.swarm import AIRFRAME
 
 REPOSITORY = Path(__file__).parents[2]
@@ -88,6 +101,47 @@ def test_an_edited_element_takes_effect_at_the_next_start(tmp_path):
 
     package.element.write_text(source)
     assert package.start() == (10.5, 0, folder), "the way back is in the cache still"
+
+
+def test_processes_that_compile_one_function_for_other_types_at_once_each_find_their_own_code(tmp_path):
+    """In numba's own way one overwrites what another has just written, or leaves an index that names it."""
+    program = (
+        "import sys\n"
+        "from ftcc.link.compiled import _CacheFile\n"
+        f"file = _CacheFile({str(tmp_path)!r}, 'law-1.py', (0.0, 0))\n"
+        "print('ready', flush=True)\n"
+        "sys.stdin.readline()\n"
+        "for n in range(30):\n"
+        "    file.save((sys.argv[1], n), f'code of {sys.argv[1]}, {n}')\n"
+    )
+    environment = {**os.environ, "FTCC_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-c", program]
+    others = [
+        subprocess.Popen(
+            [*command, str(who)], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        for who in range(3)
+    ]
+    assert [other.stdout.readline() for other in others] == ["ready\n"] * 3
+    for other in others:
+        other.stdin.write("go\n")
+        other.stdin.flush()
+    assert [other.wait(60.0) for other in others] == [0, 0, 0]
+    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    for who in range(3):
+        for n in range(30):
+            assert file.load((str(who), n)) == f"code of {who}, {n}"
+
+
+def test_a_cache_that_another_process_holds_for_ever_costs_the_kept_code_alone(tmp_path, monkeypatch):
+    def never(place):
+        raise cache.CacheBusyError("process 7 has held it")
+
+    monkeypatch.setattr(cache, "alone", never)
+    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    with pytest.warns(RuntimeWarning, match=r"law-1.py.nbi is not kept: process 7"):
+        file.save(("key", 1), "code")
+    assert file.load(("key", 1)) is None
 
 
 def test_old_caches_are_cleared_away(tmp_path):
