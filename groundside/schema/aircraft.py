@@ -142,7 +142,7 @@ class Plant(Strict):
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
         "trim",
         description="position, and command in force before the first one has come through; N, rad. With trim and a "
-        "delay the first command counts as all that came before it",
+        "delay the first command counts as all that came before it; between processes it comes a sample after t = 0",
     )
     guards: Guards = Guards()
     beyond_limits: bool = Field(False, description="true: fly although a healthy aircraft has no level trim in travel")

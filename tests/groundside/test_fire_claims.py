@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from ftcc.groundside.mission import resolve
 from ftcc.groundside.scenario import Scenario, ScenarioError, load
-from tests.groundside.conftest import failing
+from ftcc.groundside.simulate import fly, loop_of
+from ftcc.sim.plants import conditions_of
+from tests.groundside.conftest import failing, mission_of
 
 ON_PLANT_A = "monograph+hz100"
 FLOWN = (
@@ -23,6 +27,8 @@ FLOWN = (
     "flight+loss80",
     "flight+displaced",
     "flight+moved",
+    "flight+slower_load",
+    "monograph+B+slower_load",
 )
 
 EVENT = "largest position error in 5 s after disturbance and faults, any axis"
@@ -52,6 +58,22 @@ def test_without_an_observer_the_fractional_order_acts_as_an_integral(results_of
     fractional = results_of(f"{case}+off", "fire_monitoring")
     integer = results_of(f"{case}+integer+off", "fire_monitoring")
     assert fractional[RMS].value / integer[RMS].value <= 0.6
+
+
+def test_what_the_first_period_under_trim_adds_to_the_first_error():
+    """0.055 m instead of 0.066 with the first command in force from t = 0 on, as reference section 5.4 has it."""
+    mission = mission_of("flight+A", "fire_monitoring", duration=5.0)
+    loop = loop_of(mission.scheme.name, mission.plant)
+    world = loop.new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
+    loop.fly(world, mission.timing, mission.wire, 0, 1)
+    first = world.autopilots.command.tolist()
+    begun = tuple(replace(spec, command=tuple(one)) for spec, one in zip(mission.vehicles, first, strict=True))
+    flights = [fly(mission), fly(replace(mission, vehicles=begun))]
+    errors = [
+        max(np.abs(flight.column(f"Pt_{axis}", uav)).max() for uav in mission.uavs for axis in "xyz")
+        for flight in flights
+    ]
+    assert errors == pytest.approx([0.066, 0.055], rel=0.05)
 
 
 # What is refused.
@@ -95,6 +117,7 @@ def test_a_fire_that_cannot_be_is_refused(setting, said):
         (["fire_events=[{at = 9.0, drift = [1.0, 0.0]}, {at = 8.0, drift = [0.0, 0.0]}]"], "in the order of time"),
         (["gains.a=1.0"], "gain a = 1: must be from 0 to below 1"),
         (["gains.per_decade=20.0"], "more than 40 poles"),
+        (["gains.k_eta=100.0"], "gain k_eta: its rate 100 1/s is unstable in Euler steps of 20 ms"),
         (["plant.model='longitudinal'"], "no plant that scheme fire_monitoring can fly"),
         (["airframe='reference_25kg'"], "lacks kn, kd, which the plant needs"),
     ],

@@ -66,16 +66,19 @@ def response(fleet: Fleet, read: Callable[[Fleet], float], step: float) -> tuple
 
 @pytest.mark.parametrize(
     ("V", "load_time", "load_over", "bank_time", "bank_over"),
-    [(25.0, 0.197, 0.19, 0.265, 0.03), (28.0, 0.196, 0.15, 0.247, 0.03), (35.0, 0.193, 0.10, 0.218, 0.03),
-     (48.0, 0.188, 0.06, 0.193, 0.02)],
+    [(25.0, 0.197, 0.138, 0.265, 0.03), (28.0, 0.196, 0.121, 0.247, 0.03), (35.0, 0.193, 0.091, 0.218, 0.03),
+     (48.0, 0.188, 0.071, 0.193, 0.02)],
 )  # fmt: skip
 def test_steps_of_load_factor_and_bank(V, load_time, load_over, bank_time, bank_over):
-    """Reference table 10.1: 63 % and overshoot of n + 0.2 and mu + 0.3 rad; here n overshoots less below 30 m/s."""
+    """Reference table 10.1: 63 % of n + 0.2 and mu + 0.3 rad, and what bank overshoots.
+
+    The load factor overshoots its commanded step by 13.8, 12.1, 9.1 and 7.1 %, where that table has 19, 15, 10 and 6 %.
+    """
     fleet = aircraft(V)
     fleet.command[0, LOAD] = 1.2
     time, over = response(fleet, measured_load, 0.2)
     assert time == pytest.approx(load_time, rel=0.05)
-    assert over < load_over + 0.015
+    assert over == pytest.approx(load_over, abs=0.015)
     fleet = aircraft(V)
     fleet.command[0, BANK] = 0.3
     time, over = response(fleet, lambda one: truth(one)["mu"], 0.3)
