@@ -1,0 +1,292 @@
+"""What the READMEs and docs tell to type works: every command, every program, every piece of TOML in them."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+import typer
+
+from ftcc.groundside import load, resolve
+from ftcc.groundside.cli import main
+from ftcc.groundside.cli.app import app
+from ftcc.groundside.scenario import read, shipped
+from ftcc.link.compiled import SCHEME_ENTRY_POINTS
+from tests.guests import EXAMPLE, forget_schemes, install
+from tests.sitl.conftest import FTCC, Flight
+
+REPOSITORY = Path(__file__).parents[2]
+FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
+PAGES = [REPOSITORY / "README.md", *sorted(page for name in FOLDERS for page in (REPOSITORY / name).rglob("*.md"))]
+LAW = "airside/schemes/README.md"
+"""Its programs are excerpts of the example's law."""
+
+SHORTER = {
+    "simulate": ["--duration", "2"],
+    "fly": ["--duration", "1", "--viewer", "none", "--mavlink", "none", "--pack", "auto"],
+    "verify": ["--case", "flight"],
+    "study": ["--duration", "1", "--seeds", "1", "--jobs", "1"],
+}
+"""What is added to commands, so that they end soon and open nothing; of an option given twice the last one counts."""
+
+NEEDS_SWARM = {
+    "vehicles": "demo", "fault": "demo", "repair": "demo", "link": "demo", "ftc": "demo", "leader": "demo",
+    "mode": "demo", "param": "demo", "attitude": "directed_attitude",
+}  # fmt: skip
+"""Commands to a flying swarm, and the scenario that it flies."""
+
+NOT_RUN = {
+    "python3 -m venv": "sets up an environment from a network",
+    "pip install": "installs; the tests put the example on the path themselves",
+    "pytest": "is these tests",
+    "ftcc doctor": "flies for a quarter of a minute: tests/groundside/test_doctor.py",
+    "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
+    "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "docs/tick.md drawing": "is no text to type",
+}
+"""What begins like that is not run, and why."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of a page that is set apart."""
+
+    page: str
+    line: int
+    language: str
+    """"console", "python", "toml" or "drawing"."""
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+_LANGUAGES = {"python": "python", "toml": "toml", "bash": "console", "console": "console", "sh": "console"}
+
+
+def language_of(text: str) -> str:
+    """Of a block that does not say it."""
+    if re.match(r"(ftcc|python3?|pip|\.venv/bin/\w+) ", text):
+        return "console"
+    return "toml" if text.startswith("[") else "python"
+
+
+def blocks_of(page: Path) -> Iterator[Block]:
+    """The fenced and the indented blocks of a page."""
+    name, lines = str(page.relative_to(REPOSITORY)), page.read_text(encoding="utf-8").splitlines()
+    at = 0
+    while at < len(lines):
+        begin = at
+        if fence := re.match(r"```(\w*)", lines[at]):
+            at += 1
+            while not lines[at].startswith("```"):
+                at += 1
+            text = "\n".join(lines[begin + 1 : at])
+            yield Block(name, begin + 1, _LANGUAGES[fence[1]] if fence[1] else "drawing", text)
+        elif lines[at].startswith("    ") and (at == 0 or not lines[at - 1].strip()):
+            while at < len(lines) and (lines[at].startswith("    ") or not lines[at].strip()):
+                at += 1
+            text = "\n".join(line[4:] for line in lines[begin:at]).strip()
+            yield Block(name, begin + 1, language_of(text), text)
+            continue
+        at += 1
+
+
+BLOCKS = [block for page in PAGES for block in blocks_of(page)]
+
+
+def commands_of(block: Block) -> Iterator[tuple[str, str]]:
+    """The commands of a block, without comments: where it stands, and the command."""
+    for n, line in enumerate(block.text.splitlines()):
+        for command in re.split(r"\s;\s|\s&&\s", re.sub(r"\s#.*", "", line)):
+            if command.strip():
+                yield f"{block.page}:{block.line + n}", command.strip().removeprefix(".venv/bin/")
+
+
+COMMANDS = [one for block in BLOCKS if block.language == "console" for one in commands_of(block)]
+PROGRAMS = [block for block in BLOCKS if block.language == "python"]
+FRAGMENTS = [block for block in BLOCKS if block.language == "toml"]
+
+
+def not_run(command: str) -> bool:
+    return any(command.startswith(one) for one in NOT_RUN)
+
+
+def is_ftcc(command: str) -> bool:
+    return command.startswith("ftcc ") and not not_run(command)
+
+
+def swarm_for(command: str) -> str | None:
+    return NEEDS_SWARM.get(shlex.split(command)[1])
+
+
+ALONE = [one for one in COMMANDS if is_ftcc(one[1]) and swarm_for(one[1]) is None]
+COMMANDING = [one for one in COMMANDS if is_ftcc(one[1]) and swarm_for(one[1])]
+
+# The first start compiles.
+pytestmark = pytest.mark.timeout(600)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a short recorded flight of containment and a small study; the example is installed."""
+    folder = tmp_path_factory.mktemp("place")
+    site = tmp_path_factory.mktemp("site")
+    install(EXAMPLE, site)
+    (folder / "tests").mkdir()
+    (folder / "tests" / "example_scheme").symlink_to(EXAMPLE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FTCC_RUNTIME_DIR", str(folder / "runtime"))
+        patch.setenv("COLUMNS", "200")
+        patch.syspath_prepend(str(site))
+        patch.chdir(folder)
+        forget_schemes()
+        asked = "containment --duration 2 --out"
+        study = "containment --vary channel.loss=0,.3 --duration 1 --jobs 1 --out"
+        for command in (f"simulate {asked} {folder}/runs/recorded", f"study {study} {folder}/studies/flown"):
+            assert typed(command.split()) == 0
+        yield folder
+    forget_schemes()
+
+
+_OUT = itertools.count()
+"""Folders of what commands record."""
+
+
+def typed(arguments: list[str]) -> int:
+    """Exit code of a command, in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["ftcc", *arguments])
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
+
+
+def meant(text: str) -> str:
+    """``text`` with the run and the study of `place` where it leaves out a name."""
+    return re.sub(r"runs/[\w-]*\.\.\.", "runs/recorded", text.replace("studies/.../", "studies/flown/"))
+
+
+def arguments_of(command: str) -> list[str]:
+    """What is typed for a command of a page."""
+    words = shlex.split(meant(command))[1:]
+    more = SHORTER.get(words[0], [])
+    out = ["--out", f"out/{next(_OUT)}"] if words[0] in ("simulate", "fly", "study") else []
+    return [*words, *more, *out]
+
+
+@pytest.mark.parametrize(("where", "command"), ALONE, ids=[" ".join(one) for one in ALONE])
+def test_a_command_that_needs_no_swarm_ends_well(where: str, command: str, place: Path) -> None:
+    arguments = arguments_of(command)
+    if arguments[0] == "fly":
+        flown = subprocess.run([*FTCC, *arguments], cwd=place, capture_output=True, text=True, timeout=300, check=False)
+        assert flown.returncode == 0, flown.stdout + flown.stderr
+    else:
+        assert typed(arguments) == 0
+
+
+@contextmanager
+def flying(scenario: str, folder: Path) -> Iterator[Flight]:
+    """A swarm that flies."""
+    flight = Flight([scenario, "--mavlink", "none", "--pack", "auto"], folder, dict(os.environ))
+    try:
+        flight.wait_until(lambda: any((flight.folder / "parts").glob("*.arrows")))
+        yield flight
+    finally:
+        if flight.process.poll() is None:
+            flight.interrupt()
+            flight.wait(60.0)
+
+
+@pytest.mark.parametrize("scenario", sorted({*NEEDS_SWARM.values()}))
+def test_a_swarm_takes_every_command_that_the_pages_give_it(
+    scenario: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused = {}
+    with flying(scenario, place / scenario):
+        for where, command in COMMANDING:
+            if swarm_for(command) == scenario and (code := typed(arguments_of(command))):
+                refused[f"{where}: {command}"] = (code, capsys.readouterr().err)
+        for block in PROGRAMS:
+            if "Station()" in block.text and scenario == "demo":
+                executed(block)
+    assert refused == {}
+
+
+def executed(block: Block) -> dict[str, Any]:
+    """The names that a program has set."""
+    names: dict[str, Any] = {}
+    exec(compile(meant(block.text), str(block), "exec"), names)
+    return names
+
+
+@pytest.mark.parametrize("block", [one for one in PROGRAMS if one.page != LAW and "Station()" not in one.text], ids=str)
+def test_a_program_runs(block: Block, place: Path) -> None:
+    executed(block)
+
+
+@pytest.mark.parametrize("block", [one for one in PROGRAMS if one.page == LAW], ids=str)
+def test_an_excerpt_of_the_law_stands_in_the_law(block: Block) -> None:
+    law = {line.strip() for line in (EXAMPLE / "altitude_consensus.py").read_text().splitlines()}
+    assert [line for line in block.text.splitlines() if line.strip() not in law] == []
+
+
+@pytest.mark.parametrize("block", FRAGMENTS, ids=str)
+def test_a_piece_of_toml_is_taken(block: Block, tmp_path: Path) -> None:
+    """A piece of a scenario replaces its like in the shipped one of chapter 5; one of a package names its schemes."""
+    said = tomllib.loads(block.text)
+    if "project" in said:
+        offered = said["project"]["entry-points"]
+        assert [*offered] == [SCHEME_ENTRY_POINTS]
+        assert all(isinstance(module, str) for module in offered[SCHEME_ENTRY_POINTS].values())
+        if block.page == LAW:
+            assert offered == tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]["entry-points"]
+        return
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text(tomli_w.dumps(read(shipped()["containment"]) | said))
+    assert resolve(load(scenario)).warnings == resolve(load("containment")).warnings
+
+
+def inline() -> list[tuple[str, str]]:
+    """Commands within sentences."""
+    return [
+        (str(page.relative_to(REPOSITORY)), command)
+        for page in PAGES
+        for command in re.findall(r"`ftcc (\w[^`]*)`", page.read_text(encoding="utf-8"))
+    ]
+
+
+@pytest.mark.parametrize(("page", "command"), inline(), ids=[" ".join(one) for one in inline()])
+def test_a_command_within_a_sentence_exists_with_its_options(page: str, command: str) -> None:
+    words: list[str] = shlex.split(command)
+    known: Any = typer.main.get_command(app)
+    for word in words:
+        if not hasattr(known, "commands"):
+            break
+        assert word in known.commands, f"{page}: ftcc {command}"
+        known = known.commands[word]
+    options = {name for parameter in known.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    assert {word.partition("=")[0] for word in words if word.startswith("--")} <= options
+
+
+def test_what_is_not_run_is_listed_and_what_is_listed_is_there() -> None:
+    assert [command for _, command in COMMANDS if not is_ftcc(command) and not not_run(command)] == []
+    drawings = [f"{block.page} drawing" for block in BLOCKS if block.language == "drawing"]
+    assert [drawing for drawing in drawings if drawing not in NOT_RUN] == []
+    typed_somewhere = [command for _, command in COMMANDS] + drawings
+    for listed in NOT_RUN:
+        assert any(one.startswith(listed) for one in typed_somewhere), listed
