@@ -10,6 +10,7 @@ import math
 
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import wrapped
 
 __all__ = [
     "attitude_drift",
@@ -25,8 +26,8 @@ __all__ = [
 
 @compiled
 def attitude_error(own, reference):
-    """X1 - X1d: the own tracking error of (7.12) and (8.10)."""
-    return own.mu - reference.mu, own.alpha - reference.alpha, own.beta - reference.beta
+    """X1 - X1d: the own tracking error of (7.12) and (8.10), the shorter way around where the bank is inverted."""
+    return wrapped(own.mu - reference.mu), wrapped(own.alpha - reference.alpha), wrapped(own.beta - reference.beta)
 
 
 @compiled

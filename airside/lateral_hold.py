@@ -11,6 +11,7 @@ import math
 from ftcc.airside.model import clip
 from ftcc.link.actuators import AILERON, RUDDER
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import wrapped
 
 __all__ = ["hold_course"]
 
@@ -30,12 +31,11 @@ LEAST_AIRSPEED = 8.0
 def hold_course(own, course, model, command):
     """Set aileron and rudder of ``command`` (4,) for straight flight of ``own`` on ``course`` (rad), wings level."""
     V = max(own.V, LEAST_AIRSPEED)
-    away = course - own.chi
-    away -= 2.0 * math.pi * math.floor((away + math.pi) / (2.0 * math.pi))
+    away = wrapped(course - own.chi)
     bank = clip(math.atan(COURSE_RATE * away * V / model.g), -LARGEST_BANK, LARGEST_BANK)
     rolling = 0.5 * model.rho * V * V * model.S * model.b * model.Clda / model.Ix
     turning = model.g / V * math.sin(own.mu)
-    aileron = ROLL_STIFFNESS * (bank - own.mu) / rolling
+    aileron = ROLL_STIFFNESS * wrapped(bank - own.mu) / rolling
     rudder = YAW_DAMPING * (own.r - turning)
     command[AILERON] = clip(aileron, model.aileron_min, model.aileron_max)
     command[RUDDER] = clip(rudder, model.rudder_min, model.rudder_max)

@@ -2,9 +2,11 @@
 
 An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
 same times, ``total(z)`` and ``largest(z)`` are taken over all followers, ``disagreement(z)`` = sum_j a_ij (z_i - z_j)
-over those whom a follower hears. Beside the recorded columns there are, for followers of a graph with leaders, ``x_d``
-and ``z_d`` (the position and altitude that its hull weights give it), ``hull_distance`` (how far it is above or below
-all leaders) and ``hull_distance_x`` (how far ahead of or behind them).
+over those whom a follower hears. Angles are recorded within half a turn: ``wrapped(mu - mu_d)`` is a difference of them
+(rad) the shorter way around, ``turn_disagreement(mu)`` is the disagreement of such differences. Beside the recorded
+columns there are, for followers of a graph with leaders, ``x_d`` and ``z_d`` (the position and altitude that its hull
+weights give it), ``hull_distance`` (how far it is above or below all leaders) and ``hull_distance_x`` (how far ahead of
+or behind them).
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ __all__ = [
     "evaluated",
     "names_in",
     "uavs_in",
+    "unwrapped",
     "window_of",
+    "wrapped",
 ]
 
 Array = NDArray[np.float64]
@@ -63,6 +67,28 @@ class Signals(Protocol):
     def column(self, name: str, uav: int) -> Array: ...
 
 
+# --- angles ----------------------------------------------------------------------------------------------------------
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles (rad) within half a turn of 0, as ``link.rotation.wrapped``; one that is stays what it is, bit for bit."""
+    away = (np.abs(angle) > np.pi) & np.isfinite(angle)
+    return angle - 2.0 * np.pi * np.floor((np.where(away, angle, 0.0) + np.pi) / (2.0 * np.pi))
+
+
+def unwrapped(angle: Array, turn: float = 2.0 * math.pi, beside: Array | None = None) -> Array:
+    """A curve of angles without jumps of a ``turn`` (in the unit of ``angle``); where it is nan, it goes on behind.
+
+    It begins with the first angle, or, where another curve is given, within half a turn ``beside`` that one.
+    """
+    found = np.array(angle, np.float64)
+    there = np.isfinite(found)
+    found[there] = np.unwrap(found[there], period=turn)
+    if beside is not None and (both := np.flatnonzero(there & np.isfinite(beside))).size:
+        found -= turn * np.round((found[both[0]] - beside[both[0]]) / turn)
+    return found
+
+
 # --- expressions -----------------------------------------------------------------------------------------------------
 
 _OPERATORS: dict[type, Callable[..., Any]] = {
@@ -82,6 +108,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cos": np.cos,
     "exp": np.exp,
     "degrees": np.degrees,
+    "wrapped": wrapped,
     "min": np.minimum,
     "max": np.maximum,
 }
@@ -95,11 +122,11 @@ def _largest(x: Array, i: int, graph: Graph) -> Array:
     return np.asarray(x.max(axis=0), np.float64)
 
 
-def _disagreement(x: Array, i: int, graph: Graph) -> Array:
+def _disagreement(x: Array, i: int, graph: Graph, difference: Callable[[Array], Array] = np.asarray) -> Array:
     found = np.zeros(x.shape[1])
     for j, weight in enumerate(graph.adjacency[i, : len(x)]):
         if weight > 0.0:
-            found += weight * (x[i] - x[j])
+            found += weight * difference(x[i] - x[j])
     return found
 
 
@@ -107,6 +134,7 @@ _SWARM_FUNCTIONS: dict[str, Callable[[Array, int, Graph], Array]] = {
     "total": _total,
     "largest": _largest,
     "disagreement": _disagreement,
+    "turn_disagreement": functools.partial(_disagreement, difference=wrapped),
 }
 """Of the values of all followers (followers, n), seen by the i-th."""
 

@@ -1,4 +1,4 @@
-"""Attitudes as quaternions, scalar first, as all sides read them from the messages."""
+"""Angles within half a turn, and attitudes as quaternions, scalar first, as all sides read them from the messages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,25 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["body_attitude", "body_axes", "quaternion_product"]
+__all__ = ["body_attitude", "body_axes", "nearest_turn", "quaternion_product", "wrapped"]
+
+
+@compiled
+def nearest_turn(angle, to):
+    """``angle`` plus the whole turns that bring it within half a turn of ``to`` (rad); itself, bit for bit, if it is.
+
+    What is not finite stays what it is.
+    """
+    away = angle - to
+    if not math.pi < abs(away) < math.inf:
+        return angle
+    return angle - 2.0 * math.pi * math.floor((away + math.pi) / (2.0 * math.pi))
+
+
+@compiled
+def wrapped(angle):
+    """``angle`` (rad) within half a turn of 0: of a difference of two angles the shorter way."""
+    return nearest_turn(angle, 0.0)
 
 
 @compiled

@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import wrapped
 
 __all__ = ["LoopState", "deflections", "load_factor", "loop_rates"]
 
@@ -63,7 +64,7 @@ def loop_rates(loop, wanted_load, wanted_bank, measured_load):
     return (
         loop.n_r_dot,
         w * w * (wanted_load - loop.n_r) - 2.0 * _LOAD_DAMPING * w * loop.n_r_dot,
-        _clip((wanted_bank - loop.mu_r) / _BANK_TIME, -_BANK_RATE, _BANK_RATE),
+        _clip(wrapped(wanted_bank - loop.mu_r) / _BANK_TIME, -_BANK_RATE, _BANK_RATE),
         integral_rate,
     )
 
@@ -97,7 +98,7 @@ def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gam
     tan_b = sin_b / cos_b
     rolling = cos_b * (
         mu_r_dot
-        + _K_BANK * (loop.mu_r - mu)
+        + _K_BANK * wrapped(loop.mu_r - mu)
         - chi_dot * (sin_g + cos_g * sin_m * tan_b)
         - gamma_dot * cos_m * tan_b
     )  # fmt: skip

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ftcc.airside.elements.filters import critically_damped_step
-from ftcc.airside.elements.vectors import added, scaled, subtracted
+from ftcc.airside.elements.vectors import added, scaled, turned
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import nearest_turn
 
 __all__ = ["disagreement", "error_sums", "extrapolated", "filtered_error_sums", "motion_sums", "weighted_average"]
 
@@ -97,8 +98,9 @@ def motion_sums(heard, column, carried):  # type: ignore[no-untyped-def]
 def error_sums(error, heard, oldest):  # type: ignore[no-untyped-def]
     """sum_j a_ij, sum_j a_ij (e - e_j) and sum_j a_ij e_j' over the neighbours, eqs. (7.12), (8.10).
 
-    ``error`` is the own e of three axes; a record holds e_j and then its rate, both held between records. A neighbour
-    takes part from its first record on, while that is at most ``oldest`` seconds old; 0 = for ever.
+    ``error`` is the own e of three angles (rad), and differences go the shorter way around; a record holds e_j and then
+    its rate, both held between records. A neighbour takes part from its first record on, while that is at most
+    ``oldest`` seconds old; 0 = for ever.
     """
     weights = 0.0
     total = (0.0, 0.0, 0.0)
@@ -107,7 +109,7 @@ def error_sums(error, heard, oldest):  # type: ignore[no-untyped-def]
         if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
             weight, values = heard.weight[j], heard.values[j]
             weights += weight
-            total = added(total, scaled(weight, subtracted(error, (values[0], values[1], values[2]))))
+            total = added(total, scaled(weight, turned(error, (values[0], values[1], values[2]))))
             rates = added(rates, scaled(weight, (values[3], values[4], values[5])))
     return weights, total, rates
 
@@ -130,10 +132,11 @@ def filtered_error_sums(error, heard, memory, w, oldest, h):  # type: ignore[no-
                 if row[0] == 0.0:
                     row[1 + axis], row[4 + axis] = target, 0.0
                 else:
+                    target = nearest_turn(target, row[1 + axis])
                     row[1 + axis], row[4 + axis] = critically_damped_step(row[1 + axis], row[4 + axis], target, w, h)
             row[0] = 1.0
             weight = heard.weight[j]
             weights += weight
-            total = added(total, scaled(weight, subtracted(error, (row[1], row[2], row[3]))))
+            total = added(total, scaled(weight, turned(error, (row[1], row[2], row[3]))))
             rates = added(rates, scaled(weight, (row[4], row[5], row[6])))
     return weights, total, rates

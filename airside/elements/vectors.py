@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ftcc.airside.model import clip
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import nearest_turn, wrapped
 
 __all__ = [
     "added",
@@ -11,10 +12,12 @@ __all__ = [
     "applied_transposed",
     "dot",
     "limited_to",
+    "nearest_turns",
     "over",
     "scaled",
     "subtracted",
     "times",
+    "turned",
 ]
 
 
@@ -28,6 +31,18 @@ def added(a, b):
 def subtracted(a, b):
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def turned(a, b):
+    """From the angles b to the angles a (rad), each the shorter way around: a - b within half a turn."""
+    return wrapped(a[0] - b[0]), wrapped(a[1] - b[1]), wrapped(a[2] - b[2])
+
+
+@compiled
+def nearest_turns(a, b):
+    """The angles a (rad) plus the whole turns that bring each within half a turn of its like in b."""
+    return nearest_turn(a[0], b[0]), nearest_turn(a[1], b[1]), nearest_turn(a[2], b[2])
 
 
 @compiled

@@ -37,7 +37,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree
+from ftcc.airside.conditions import largest_degree, stable_in_steps
 from ftcc.airside.elements.filters import (
     butterworth,
     robust_exact_differentiator_step,
@@ -57,6 +57,7 @@ from ftcc.airside.elements.vectors import (
     scaled,
     subtracted,
     times,
+    turned,
 )
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, clip
@@ -255,6 +256,10 @@ _FEED_FORWARD_FILTER = 0.05
 """Time constant of the low-pass on the feed-forward, s."""
 _DYNAMIC_SURFACE = 0.05
 """Time constant of the traditional law's filter, s."""
+_FASTEST_OBSERVER, _SLOWEST_OBSERVER, _FASTEST_NEIGHBOURS = 0.4, 10.0, 20.0
+"""Where trouble begins, see `_sampled_well`: share of the control rate; rad/s; rad/s."""
+_FASTEST_LOW_PASS = math.sqrt(6.0) - math.sqrt(2.0)
+"""w h at which the semi-implicit steps of (7.35) become unstable: 4 = 2 sqrt(2) w h + (w h)^2."""
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -411,7 +416,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     e_dot, F1 = state.e_dot, state.F1
     if gains.feed_forward > 0.0:
         if not first:
-            difference = scaled(1.0 / dt, subtracted(e, state.e))
+            difference = scaled(1.0 / dt, turned(e, state.e))
             e_dot = added(e_dot, scaled(1.0 - math.exp(-dt / _RATE_FILTER), subtracted(difference, e_dot)))
         seen = subtracted(added(e_dot, reference_rate), applied(G1, x2))
         share_of_new = 1.0 if first else 1.0 - math.exp(-dt / _FEED_FORWARD_FILTER)
@@ -491,7 +496,7 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
     """The own tracking error, and its rate as the difference to the tick before."""
     e = attitude_error(own, reference)
     since = own.t - state.t
-    e_dot = scaled(1.0 / since, subtracted(e, state.e)) if since > 0.0 else _ZERO
+    e_dot = scaled(1.0 / since, turned(e, state.e)) if since > 0.0 else _ZERO
     return e + e_dot
 
 
@@ -532,4 +537,55 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
     if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
         problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))
+    return problems + _sampled_well(gains, flight.period)
+
+
+def _sampled_well(gains: Gains, period: float) -> list[Problem]:
+    """What observer and filters need of the control period (s).
+
+    Measured at 200 Hz on the published faults (largest bank error from 3 s on, deg; mean change of the aileron's
+    command per tick, deg):
+
+        observer              1     10     20     40     80     90    160    400    1000   5000 rad/s
+        observer * period  .005    .05     .1     .2     .4    .45     .8      2       5     25
+        bank error         14.3    3.4    1.7    1.6    1.4    1.3    1.2    1.8    13.3   14.4
+        aileron             .16    .07    .07    .07    .12    .61    1.6     30      36     37
+
+    The low-pass flies up to 200 rad/s and ends in infinities at 300. Neighbours' errors, filtered: the aileron changes
+    by .09 deg up to 20 rad/s, by 1.7 deg at 25, whatever the exchange rate.
+    """
+    problems = stable_in_steps({"observer": gains.observer}, period)
+    fast = gains.observer * period
+    if _FASTEST_OBSERVER < fast < 2.0:
+        problems.append(
+            Problem(
+                False,
+                f"gain observer = {gains.observer:g} rad/s: {fast:.2g} of the control rate, {1.0 / period:.0f} Hz; the "
+                f"surfaces chatter beyond {_FASTEST_OBSERVER:g}, {_FASTEST_OBSERVER / period:.0f} rad/s",
+            )
+        )
+    if 0.0 < gains.observer <= _SLOWEST_OBSERVER:
+        problems.append(
+            Problem(
+                False,
+                f"gain observer = {gains.observer:g} rad/s: slower than the faults; from {_SLOWEST_OBSERVER:g} rad/s "
+                "down the bank error is twice as large and more",
+            )
+        )
+    if gains.w_u * period >= _FASTEST_LOW_PASS:
+        problems.append(
+            Problem(
+                True,
+                f"gain w_u = {gains.w_u:g} rad/s: must be below {_FASTEST_LOW_PASS / period:.0f} rad/s, or its steps "
+                f"of {period * 1e3:g} ms are unstable",
+            )
+        )
+    if gains.neighbour_filter > _FASTEST_NEIGHBOURS:
+        problems.append(
+            Problem(
+                False,
+                f"gain neighbour_filter = {gains.neighbour_filter:g} rad/s: beyond {_FASTEST_NEIGHBOURS:g} rad/s the "
+                "steps between the neighbours' records make the surfaces chatter",
+            )
+        )
     return problems

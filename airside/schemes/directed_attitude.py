@@ -45,6 +45,7 @@ from ftcc.airside.elements.vectors import (
     applied_transposed,
     dot,
     limited_to,
+    nearest_turns,
     over,
     scaled,
     subtracted,
@@ -209,6 +210,8 @@ _LARGEST_SIDESLIP = math.radians(60.0)
 """Sideslip guard in the kinematics, rad."""
 _STEEPEST = 5.5
 """Largest gain of the outer loop that the reference has flown, 1/rad: phi / (k eps_inf)."""
+_FASTEST_OBSERVER = 0.3
+"""Largest k9 times the control period, see `_sampled_well`."""
 _DEGREES = math.radians(1.0)
 _BUTTERWORTH = math.sqrt(0.5)
 _ZERO = (0.0, 0.0, 0.0)
@@ -284,7 +287,8 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     """One tick: the state ``dt`` later, and what is commanded and seen now. All rates are those of the tick's start."""
     first = state.ticks == 0.0
     V = max(own.V, _LEAST_AIRSPEED)
-    x1, x2 = (own.mu, own.alpha, own.beta), (own.p, own.q, own.r)
+    # Where the measured bank jumps by a turn, prediction and observer go on.
+    x1, x2 = nearest_turns((own.mu, own.alpha, own.beta), state.x1_hat), (own.p, own.q, own.r)
     reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
     weights_seen = _frobenius(state.W1), _frobenius(state.W2)
 
@@ -414,4 +418,51 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                     f"control is held up to {_STEEPEST:g}, lost from 6.8 on; widen eps_inf or lower lambda1, lambda2",
                 )
             )
+        problems += _sampled_well(gains, flight.period)
+    return problems
+
+
+def _sampled_well(gains: Gains, period: float) -> list[Problem]:
+    """What filter and observer need of the control period (s).
+
+    Measured at 100 Hz on the published faults (largest bank error from 3 s on, deg; mean change of the aileron's
+    command per tick, deg):
+
+        tau            .001   .002  .003  .005  .007   .01   .02   .04   .16    .2    .3    .6 s
+        bank error     lost    189   3.6   3.6   3.8   4.1   4.5   4.9   6.0   6.3    16    29
+        aileron          16     10   2.4   1.0   .23   .10   .07   .05   .08   .14   .24   .93
+
+        k9                1      3     9    20    28    32    36    40    80 1/s (alpha error instead of bank)
+        alpha error     3.7    1.5   .83   .61   .58   1.3   2.5   3.3   6.9
+        aileron         .13    .06   .05   .04   .04   .13   .57   .76   3.4
+
+    At 200 Hz k9 = 60 1/s flies as 20 does, at a tau of a period as at one of two. k1, k2, k8 and w_u change next to
+    nothing below 2 / period.
+    """
+    problems = stable_in_steps({"tau": 1.0 / gains.tau}, period)
+    if not problems and gains.tau < period:
+        problems.append(
+            Problem(
+                False,
+                f"gain tau = {gains.tau:g} s: shorter than the control period, {period:g} s; the rate command's "
+                "derivative is overrated, and the surfaces chatter",
+            )
+        )
+    slowest = 1.0 / max(gains.k4_mu, gains.k4_alpha, gains.k4_beta)
+    if gains.tau > 1.2 * slowest:
+        problems.append(
+            Problem(
+                False,
+                f"gain tau = {gains.tau:g} s: slower than the loop that it filters for, 1 / k4 = {slowest:.3g} s; "
+                "errors grow to several times their size",
+            )
+        )
+    if gains.k9 * period > _FASTEST_OBSERVER:
+        problems.append(
+            Problem(
+                False,
+                f"gain k9 = {gains.k9:g} 1/s: the rates' observer makes the loop cycle beyond "
+                f"{_FASTEST_OBSERVER / period:.0f} 1/s at a control rate of {1.0 / period:.0f} Hz",
+            )
+        )
     return problems

@@ -422,4 +422,6 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                 "below 125 Hz (100 Hz with gain prediction = 1)",
             )
         )
+    # 600 rad/s flies as 1 does, 1500 rad/s loses the aircraft.
+    problems += stable_in_steps({"low_pass": gains.low_pass * math.sqrt(2.0)}, flight.period / gains.substeps)
     return problems

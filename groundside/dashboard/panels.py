@@ -38,6 +38,8 @@ _MEANINGS = {
     "alpha": ("Angle of attack", "rad"),
     "beta": ("Sideslip", "rad"),
 }
+_ROUND = ("mu", "alpha", "chi")
+"""True states that are told within half a turn, and whose curves go on beyond it."""
 _REFERENCES = ("_r", "_ref", "_d", "hat", "_hat", "_id")
 """How the signal is called that says what a state should be, the nearest to the law first."""
 _NO_LIMIT = 2.0 * math.pi
@@ -69,6 +71,8 @@ class Panel:
     """Shade what lies between the leaders."""
     obstacles: bool = False
     """Draw the top of the obstacle that any UAV is above."""
+    round: bool = False
+    """An angle: its curves go on where it jumps by a turn."""
     degrees: bool = False
     """Show angles in degrees, as the chapters on attitude do."""
 
@@ -130,6 +134,7 @@ def _motion(subject: Subject) -> list[Panel]:
                 band=band,
                 obstacles=obstacles,
                 notes=tuple(notes),
+                round=name in _ROUND,
             )
         )
     return panels

@@ -39,6 +39,8 @@ class Plots:
         self._colors = colors(subject.graph.uavs)
         self._groups = panels_of(subject)
         self._panels = [panel for panels in self._groups.values() for panel in panels]
+        self._angles: dict[tuple[str, int | None], float] = {}
+        """Where the curves of angles ended, by panel and UAV."""
         self._uavs, self._followers = self._whose(everybody=True), self._whose(everybody=False)
         """Whose curves panels show, and whose of them that only followers have."""
 
@@ -96,10 +98,16 @@ class Plots:
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
         uavs = self._uavs if panel.everybody else self._followers
         values = self._reach(panel, snapshot) if self._detail.crowded else []
-        values += [panel.read(panel.value, _state(snapshot, uav)) for uav in uavs]
+        read = {uav: self._going_on(panel, uav, panel.read(panel.value, _state(snapshot, uav))) for uav in {*uavs}}
+        values += [read[uav] for uav in uavs]
         followers = [_state(snapshot, uav) for uav in self._followers]
         if panel.second is not None:
-            values += [panel.read(panel.second, state) for state in followers]
+            seconds = [panel.read(panel.second, state) for state in followers]
+            if panel.round:
+                turn = 2.0 * math.pi * panel.scale
+                pairs = zip(self._followers, seconds, strict=True)
+                seconds = [_beside(value, read.get(uav, math.nan), turn) for uav, value in pairs]
+            values += seconds
         if isinstance(panel.bound, str):
             bounds = [abs(panel.read(("signals", panel.bound), state)) for state in followers]
             values += bounds + [-bound for bound in bounds]
@@ -112,6 +120,14 @@ class Plots:
             beneath = [o.top for o in self._subject.obstacles if any(o.start < x < o.end for x in places)]
             values.append(max(beneath, default=math.nan))
         return values
+
+    def _going_on(self, panel: Panel, uav: int | None, value: float) -> float:
+        """An angle without the jump of a turn since the picture before; another value as it is."""
+        if not panel.round or not math.isfinite(value):
+            return value
+        value = _beside(value, self._angles.get((panel.path, uav), math.nan), 2.0 * math.pi * panel.scale)
+        self._angles[panel.path, uav] = value
+        return value
 
     def _reach(self, panel: Panel, snapshot: Snapshot) -> list[float]:
         """The lowest and the highest value of all whom a panel is about."""
@@ -143,6 +159,11 @@ class Plots:
 def _curves_of(panel: Panel) -> str:
     """Entity of a panel's series; a band beside them is an entity of its own."""
     return f"{panel.path}/uavs" if panel.band else panel.path
+
+
+def _beside(angle: float, other: float, turn: float) -> float:
+    """``angle`` within half a ``turn`` of another one, if that is known."""
+    return angle - turn * round((angle - other) / turn) if math.isfinite(angle) and math.isfinite(other) else angle
 
 
 def _state(snapshot: Snapshot, uav: int | None) -> UavState | None:

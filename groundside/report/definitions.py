@@ -6,6 +6,7 @@ monograph reads off them, so that a run can be held against it.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self
@@ -26,6 +27,7 @@ __all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "
 
 _FOLDER = Path(__file__).parent / "figures"
 
+_TURNS = {"rad": 2.0 * math.pi, "deg": 360.0}
 Uavs = list[Id] | Literal["followers", "leaders", "all"]
 
 
@@ -46,11 +48,22 @@ class Panel(Strict):
     limits: str | None = Field(None, description="actuator whose limits are drawn")
     window: tuple[float, float] | None = Field(None, description="s; a detail, beside the others")
     equal: bool = Field(False, description="both axes to the same scale")
-    unwrap: bool = Field(False, description="y is an angle in rad that goes on beyond pi")
+    unwrap: bool = Field(False, description="y is an angle that goes on beyond half a turn; unit rad or deg")
     shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
     surroundings: Literal["obstacles", "fire"] | None = Field(
         None, description='"obstacles" where x is the forward position and y the altitude; "fire" on a map, north up'
     )
+
+    @property
+    def turn(self) -> float | None:
+        """A whole turn in the unit of y, where y is drawn without jumps of one."""
+        return _TURNS[self.unit] if self.unwrap else None
+
+    @model_validator(mode="after")
+    def _turns(self) -> Self:
+        if self.unwrap and self.unit not in _TURNS:
+            raise ValueError(f"unwrap: unit = {self.unit!r} is not that of an angle, {' or '.join(_TURNS)}")
+        return self
 
 
 class Reading(Strict):
@@ -131,7 +144,8 @@ _PLANES = {
 def plain_sheet(mission: Mission) -> Sheet:
     """Figures from what a scheme declares: motion, errors with their bounds, commands with their limits, estimates."""
     motion = [
-        Panel(y=name, label=meaning, unit=unit, uavs="all") for name, meaning, unit in _PLANES[mission.scheme.plant]
+        Panel(y=name, label=meaning, unit=unit, uavs="all", unwrap=unit == "rad")
+        for name, meaning, unit in _PLANES[mission.scheme.plant]
     ]
     figures = [Figure(name="motion", title="Motion", panels=motion)]
     errors, estimates = [], []

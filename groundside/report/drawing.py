@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
+from ftcc.groundside.metrics import unwrapped
 from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
 from ftcc.groundside.report.definitions import Panel
@@ -130,7 +131,7 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
                 color = hexadecimal(colors(range(1, len(panel.pairs) + 1))[k + 1])
             if panel.shared and not several:
                 color = _INK
-            y = np.unwrap(curve.y) if panel.unwrap else curve.y
+            y = curve.y if panel.turn is None else unwrapped(curve.y, panel.turn)
             style = "--" if curve.uav in leaders and panel.pairs is None else "-"
             axes.plot(*_thinned(curve.x, y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
             if panel.shared:
@@ -184,8 +185,10 @@ def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
     """Bounds dashed, both ways; true values dotted in the colour of text; references thin."""
     tints = colors(flight.mission.uavs)
     if panel.reference is not None:
+        begins = {c.uav: c.y for c in curves_of(panel.y, flight, panel.uavs, None, panel.window, panel.x)}
         for curve in curves_of(panel.reference, flight, panel.uavs, None, panel.window, panel.x):
-            axes.plot(*_thinned(curve.x, curve.y), "--", color=hexadecimal(tints[curve.uav]), linewidth=0.5, zorder=2)
+            y = curve.y if panel.turn is None else unwrapped(curve.y, panel.turn, begins.get(curve.uav))
+            axes.plot(*_thinned(curve.x, y), "--", color=hexadecimal(tints[curve.uav]), linewidth=0.5, zorder=2)
     if panel.bound is not None:
         for curve in curves_of(panel.bound, flight, panel.uavs, None, panel.window, panel.x):
             x, y = _thinned(curve.x, np.abs(curve.y))

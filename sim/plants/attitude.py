@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import wrapped
 from ftcc.sim.airframe import Airframe, Deflections, attitude_rates
 from ftcc.sim.plant import (
     AIRSPEED,
@@ -110,11 +111,6 @@ def rates(s, u, d, a):
 
 
 @compiled
-def _wrapped(angle):
-    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
-
-
-@compiled
 def airspeed(s):
     """Airspeed, m/s."""
     return s.V
@@ -124,8 +120,8 @@ def airspeed(s):
 def truth(s, u, offset, out):
     """Write the channels of ``plant.TRUTH`` that are states, course and bank within +-pi."""
     out[X], out[Y], out[Z], out[V] = s.x, s.y, s.z, s.V
-    out[GAMMA], out[CHI] = s.gamma, _wrapped(s.chi)
-    out[MU], out[ALPHA], out[BETA] = _wrapped(s.mu), s.alpha, s.beta
+    out[GAMMA], out[CHI] = s.gamma, wrapped(s.chi)
+    out[MU], out[ALPHA], out[BETA] = wrapped(s.mu), s.alpha, s.beta
     out[P], out[Q], out[R] = s.p, s.q, s.r
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
+from ftcc.link.rotation import wrapped
 from ftcc.sim.plant import AIRSPEED, CHI, CLIMB, GAMMA, MU, NUMBER, THETA, V, X, Y, Z
 
 __all__ = [
@@ -153,7 +154,7 @@ def truth(s, u, offset, out):
     out[V] = math.sqrt(ground * ground + s.vz * s.vz)
     out[GAMMA] = math.atan2(s.vz, ground)
     out[CHI] = math.atan2(s.vy, s.vx)
-    out[MU] = u.bank
+    out[MU] = wrapped(u.bank)
 
 
 @compiled

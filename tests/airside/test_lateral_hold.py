@@ -69,6 +69,15 @@ def test_it_turns_the_short_way_to_a_course_behind_with_a_bounded_bank():
     assert np.ptp(turned) < 0.35, "0.28 rad to the right"
 
 
+@pytest.mark.parametrize("bank", [3.1, -3.1])
+def test_an_inverted_aircraft_is_rolled_back_the_shorter_way(bank):
+    """To the left it would be asked to bank by 0.5 rad: from -3.1 rad that is 2.7 rad on, not 3.6 rad back."""
+    own = Own(**dict.fromkeys(Own._fields, 0.0) | {"V": 30.0, "mu": bank, "chi": math.copysign(1.0, bank)})
+    command = np.zeros(4)
+    hold_course(own, 0.0, MODEL, command)
+    assert command[0] * bank < 0.0, "left bank is asked for where it is right of the course, and the other way around"
+
+
 def test_a_level_flight_on_course_is_left_alone():
     """No aileron, no rudder: the vertical plane stays one."""
     rows = flown(30.0, 5.0)

@@ -253,6 +253,17 @@ def test_swarm_functions_look_at_all_followers_and_at_the_neighbours(known: Know
         check_expression("total(x, z)", known.names)
 
 
+def test_angles_on_both_sides_of_half_a_turn_are_near_each_other(known: Known) -> None:
+    """x stands for a bank: 3.1 rad of UAV 1, -3.1 of UAV 2; both hear one another with weight 1."""
+    for uav, bank in ((1, 3.1), (2, -3.1)):
+        known.data[("x", uav)] = np.full(len(T), bank)
+    apart = 6.2 - 2.0 * math.pi
+    np.testing.assert_allclose(evaluated("wrapped(x - x[2])", known, GRAPH, 1), apart)
+    np.testing.assert_allclose(evaluated("turn_disagreement(x)", known, GRAPH, 1), apart)
+    np.testing.assert_allclose(evaluated("turn_disagreement(x)", known, GRAPH, 2), -apart)
+    assert evaluated("wrapped(x)", known, GRAPH, 1)[0] == 3.1, "what is within half a turn stays"
+
+
 def test_when_a_uav_was_lost_can_be_claimed_of_a_flight_that_was_long_enough(known: Known) -> None:
     for name in ("z", "x"):
         known.data[(name, 2)] = known.data[(name, 2)][:691]

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
+from ftcc.airside.scheme import Quantity
 from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import in_words
@@ -40,6 +42,7 @@ from tests.groundside.synthetic_swarm import (
     HAPPENINGS,
     LEADERS,
     LIMITS,
+    SIGNALS,
     SUBJECT,
     flight,
     leaders_at,
@@ -153,6 +156,26 @@ def test_an_obstacle_is_drawn_beneath_the_altitudes_of_those_who_are_above_it() 
     before, above = ({entry.path: entry.what for entry in plots.draw(snapshot(t))} for t in (5.0, 10.0))
     assert np.isnan(before["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1])
     assert above["/plots/motion/z/uavs"].scalars.as_arrow_array().to_pylist()[-1] == 870.0
+
+
+def test_a_bank_that_passes_half_a_turn_is_drawn_on_its_reference_beside_it() -> None:
+    subject = replace(SUBJECT, family="attitude", signals=(Quantity("mu_d", "rad", "reference, bank"), *SIGNALS))
+    plots = Plots(subject, Detail(subject))
+    drawn = []
+    for told, wanted in ((179.0, 181.0), (-179.0, 182.0), (-177.0, -178.0), (178.0, 177.0)):
+        flown = snapshot(1.0)
+        uavs = {
+            uav: replace(
+                state,
+                truth=state.truth | {"mu": math.radians(told)},
+                signals=state.signals | {"mu_d": math.radians(wanted)},
+            )
+            for uav, state in flown.uavs.items()
+        }
+        (bank,) = [e.what for e in plots.draw(replace(flown, uavs=uavs)) if e.path == "/plots/motion/mu"]
+        values = bank.scalars.as_arrow_array().to_pylist()
+        drawn.append((values[0], values[len(subject.graph.uavs)]))
+    assert drawn == [pytest.approx(two) for two in ((179.0, 181.0), (181.0, 182.0), (183.0, 182.0), (178.0, 177.0))]
 
 
 def test_tracking_errors_with_their_bounds(recording: Path) -> None:

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from ftcc.airside import schemes
 from ftcc.groundside.errors import UserError
@@ -227,6 +228,13 @@ def test_readings_tell_what_agrees_and_by_how_much_others_differ() -> None:
     assert (three.measured, three.agrees, three.difference) == ("3", False, "the lowest value differs by +1 m/s")
     assert (four.agrees, four.difference) == (None, "not flown")
     assert (five.agrees, five.difference) == (None, "not recorded")
+
+
+def test_only_an_angle_is_drawn_without_jumps_of_a_turn() -> None:
+    assert Panel(y="degrees(mu)", label="bank", unit="deg", unwrap=True).turn == 360.0
+    assert Panel(y="mu", label="bank", unit="rad").turn is None
+    with pytest.raises(ValidationError, match="unit = 'm' is not that of an angle"):
+        Panel(y="z", label="altitude", unit="m", unwrap=True)
 
 
 def test_thinned_curves_keep_their_extremes() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -122,3 +124,19 @@ def test_the_filter_of_a_dropped_neighbour_stands_still():
     assert weights == pytest.approx(0.9)
     assert (memory[2] == before[2]).all()
     assert (memory[:2] != before[:2]).any()
+
+
+def test_errors_on_both_sides_of_half_a_turn_are_near_each_other():
+    """Own bank error 3.1 rad, the neighbour's -3.1: 0.083 rad apart, also where the neighbour's crosses while heard."""
+    own, there = (3.1, 0.0, 0.0), np.zeros((3, 6))
+    there[0, 0] = -3.1
+    only = (1.0, 0.0, 0.0)
+    _, total, _ = error_sums(own, told(only, there), 0.0)
+    assert total[0] == pytest.approx(WEIGHT[0] * (6.2 - 2.0 * math.pi))
+    memory = np.zeros((3, 7))
+    here = there.copy()
+    here[0, 0] = 3.14
+    filtered_error_sums(own, told(only, here), memory, 10.0, 0.0, 0.005)
+    _, total, rates = filtered_error_sums(own, told(only, there), memory, 10.0, 0.0, 0.005)
+    assert abs(total[0]) < 0.1 * WEIGHT[0]
+    assert abs(rates[0]) < 0.1 * 10.0 * WEIGHT[0]

@@ -6,16 +6,20 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ftcc.airside.autopilots import build, tick_of
 from ftcc.airside.scheme import Flight
 from ftcc.airside.schemes import find
+from ftcc.airside.schemes.attitude_synchronization import _low_passed as low_passed
 from ftcc.groundside.mission import resolve
 from ftcc.groundside.scenario import load
 from ftcc.link.graph import Graph, GraphError
+from ftcc.link.rotation import wrapped
 
 REPOSITORY = Path(__file__).parents[3]
 LAWS = ("attitude_synchronization", "directed_attitude")
@@ -51,6 +55,12 @@ class Pilot:
         names = (signal.name for signal in self.scheme.signals)
         return dict(zip(names, self.autopilots.signals[0].tolist(), strict=True))
 
+    def wanted(self, **reference: float) -> Pilot:
+        """Another reference (rad), which stays."""
+        for place, name in enumerate(("mu", "alpha", "beta")):
+            self.autopilots.reference[0, place] = reference.get(name, 0.0)
+        return self
+
     @property
     def command(self) -> tuple[float, float, float]:
         """Aileron, elevator, rudder, rad."""
@@ -77,6 +87,32 @@ def test_the_synchronization_error_weighs_the_own_error_and_the_neighbours(law, 
     error = "E_mu" if law == LAWS[0] else "e_mu"
     assert Pilot(law).see(mu=0.05, **alpha)[error] == pytest.approx(own_share * 0.05)
     assert Pilot(law).see(0.02, mu=0.05, **alpha)[error] == pytest.approx(own_share * 0.05 + other_share * 0.03)
+
+
+@pytest.mark.parametrize(("law", "own_share", "other_share"), [(LAWS[0], 1.2, 2.0), (LAWS[1], 0.4, 0.25 * 0.5)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_error_across_half_a_turn_is_the_shorter_way_around(law, own_share, other_share, side):
+    """Reference 179 deg, bank -179 deg: 2 deg too far right; a neighbour that is 3 deg off: 1 deg less."""
+    degree = math.radians(side)
+    error = "E_mu" if law == LAWS[0] else "e_mu"
+    seen = Pilot(law).wanted(mu=179.0 * degree).see(3.0 * degree, mu=-179.0 * degree)[error]
+    assert seen == pytest.approx(own_share * 2.0 * degree - other_share * degree)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_bank_that_passes_half_a_turn_jumps_in_no_estimate(law):
+    """Rolling on at 0.4 rad/s, told within half a turn: estimates and commands are those of a roll elsewhere."""
+    shown = {"upright": [], "inverted": []}
+    for where, bank in (("upright", 0.0), ("inverted", math.pi)):
+        pilot = Pilot(law).wanted(mu=bank)
+        for n in range(-10, 11):
+            roll = 0.4 * pilot.period * n
+            mu = wrapped(bank + roll)
+            signals = pilot.see(mu=mu, alpha=math.radians(2.0), p=0.4)
+            names = ("E_mu", "p_d") if law == LAWS[0] else ("e_mu", "p_d", "D1_mu", "D2_p")
+            shown[where].append([signals[name] for name in names])
+    # The networks see the bank itself; they have hardly begun to learn.
+    assert np.array(shown["inverted"]) == pytest.approx(np.array(shown["upright"]), abs=0.05)
 
 
 def test_a_neighbour_silent_for_half_a_second_is_left_out():
@@ -138,6 +174,37 @@ def test_a_tighter_bound_is_a_higher_gain_of_which_the_second_law_warns(gains, s
     law = find("directed_attitude")
     found = [p for p in law.check(law.gains("flight", gains), FLIGHT) if "phi / (k eps_inf)" in p.text]
     assert [p.fatal for p in found] == [False] * steep
+
+
+@pytest.mark.parametrize(
+    ("law", "gains", "fatal", "because"),
+    [
+        (LAWS[0], {"observer": 90.0}, False, "observer = 90 rad/s: 0.45 of the control rate"),
+        (LAWS[0], {"observer": 5000.0}, True, "observer: its rate 5000 1/s is unstable"),
+        (LAWS[0], {"observer": 5.0}, False, "observer = 5 rad/s: slower than the faults"),
+        (LAWS[0], {"w_u": 208.0}, True, "w_u = 208 rad/s: must be below 207 rad/s"),
+        (LAWS[0], {"neighbour_filter": 25.0}, False, "neighbour_filter = 25 rad/s"),
+        (LAWS[1], {"tau": 0.001}, True, "tau: its rate 1000 1/s is unstable"),
+        (LAWS[1], {"tau": 0.007}, False, "tau = 0.007 s: shorter than the control period, 0.01 s"),
+        (LAWS[1], {"tau": 0.3}, False, "tau = 0.3 s: slower than the loop"),
+        (LAWS[1], {"k9": 40.0}, False, "k9 = 40 1/s: the rates' observer makes the loop cycle beyond 30 1/s"),
+    ],
+)
+def test_what_cannot_be_sampled_well_is_said(law, gains, fatal, because):
+    """At the control rates of the two chapters; where trouble begins is measured, see the laws."""
+    scheme = find(law)
+    flight = replace(FLIGHT, period=0.005 if law == LAWS[0] else 0.01)
+    problems = scheme.check(scheme.gains("flight", gains), flight)
+    assert [problem.fatal for problem in problems if because in problem.text] == [fatal], problems
+    assert scheme.check(scheme.gains("flight", {}), flight) == []
+
+
+@pytest.mark.parametrize(("w", "bounded"), [(206.0, True), (208.0, False)])
+def test_the_limit_of_the_low_pass_is_that_of_its_steps(w, bounded):
+    y, rate = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for _ in range(5000):
+        y, rate = low_passed(y, rate, (0.0, 0.0, 0.0), w, 0.005)
+    assert (abs(y[0]) < 10.0) == bounded
 
 
 def test_each_law_demands_its_own_graph():

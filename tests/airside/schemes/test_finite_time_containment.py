@@ -156,6 +156,7 @@ def test_both_forms_pass():
         ({"b3": -0.1}, "gain b3 = -0.1: must be >= 0"),
         ({"substeps": 2.5}, "whole number"),
         ({"beta4": 0.1}, "must exceed the leaders' largest acceleration, 0.200 m/s^2 (Lemma 6.6)"),
+        ({"low_pass": 1500.0}, "gain low_pass: its rate 2121 1/s is unstable in Euler steps of 1 ms"),
         ({"kappa": 0.001}, "gain beta4 / kappa: its rate 4800 1/s is unstable in Euler steps of 1 ms"),
         ({"beta2": 30.0}, "gain beta2 / kappa"),
         ({"cap4": 0.0}, "gain cap4 = 0: must be > 0"),
