@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Annotated
 
 import typer
@@ -23,6 +24,11 @@ from ftcc.groundside.cli.common import (
 )
 
 __all__ = ["check", "list_all", "simulate", "verify"]
+
+
+_SILENT = 10.0
+"""Wall time after which a start that compiles says so, also where no bar is shown, s."""
+_COMPILING = "compiling, once for each version of the sources: half a minute, or minutes where the cores are busy"
 
 
 def list_all() -> None:
@@ -101,12 +107,20 @@ def simulate(
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"))
     with Progress(*columns, console=terminal(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing (the first start compiles for half a minute)", total=None)
-        flying = f"simulating {mission.name} {mission.case}"
-        flight = fly(
-            mission,
-            lambda t: progress.update(task, completed=t),
-            lambda: progress.update(task, description=flying, total=mission.timing.duration),
-        )
+        compiling = threading.Timer(_SILENT, lambda: progress.console.print(_COMPILING, soft_wrap=True))
+        compiling.daemon = True
+        compiling.start()
+
+        def ready() -> None:
+            compiling.cancel()
+            progress.update(
+                task, description=f"simulating {mission.name} {mission.case}", total=mission.timing.duration
+            )
+
+        try:
+            flight = fly(mission, lambda t: progress.update(task, completed=t), ready)
+        finally:
+            compiling.cancel()
         run = record(flight, folder)
     # What was recorded is in memory still.
     show_summary(folder, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration))

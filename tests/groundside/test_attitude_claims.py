@@ -7,10 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from ftcc.groundside.cases import claims_in_flight, load_case
 from ftcc.groundside.claims import Result
+from ftcc.groundside.metrics import unwrapped, wrapped
+from ftcc.groundside.mission import resolve
+from ftcc.groundside.scenario import load
+from ftcc.groundside.simulate import fly
 from tests.groundside.conftest import failing
 
 SYNCHRONIZED = ("monograph", "flight", "flight+bare", "flight+bare+off", "flight+loss_30", "monograph+traditional")
@@ -43,3 +48,23 @@ def test_the_traditional_law_loses_the_bank_that_fault_tolerance_keeps(
     lost = results_of("monograph+traditional", "attitude_synchronization")["rms of BASTEM once control is lost"].value
     kept = results_of("monograph", "attitude_synchronization")["rms of BASTEM (7.69)"].value
     assert lost > 100.0 * kept
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("scenario", ["attitude_synchronization", "directed_attitude"])
+def test_an_inverted_swarm_rolls_upright_the_shorter_way(scenario: str, side: float) -> None:
+    """From -166 deg of bank to 80 deg: through half a turn, 114 deg, where level wings would be 246 deg away."""
+    begin, end = -2.9 * side, 1.4 * side
+    settings = [
+        *(f"start.uav.{uav}.mu={begin}" for uav in range(1, 5)),
+        f"attitude.commands=[{{at=0.0, bank={end}, alpha=0.04, sideslip=0.0}}]",
+        "faults=[]",
+        "disturbances=[]",
+        "start.z=3000.0",
+    ]
+    flight = fly(resolve(load(scenario, settings=settings, duration=8.0)))
+    assert flight.lost == {}
+    for uav in flight.mission.uavs:
+        rolled = unwrapped(flight.column("mu", uav))
+        assert np.abs(rolled - begin).max() < np.radians(114.0 + 75.0), "the first swing overshoots"
+        assert np.degrees(wrapped(rolled[-1] - np.array(end))) == pytest.approx(0.0, abs=2.0)
