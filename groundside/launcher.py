@@ -192,8 +192,8 @@ class Swarm:
         span = f"{group[0]}" if len(group) == 1 else f"{group[0]}-{group[-1]}"
         name = f"uav{span}-{kind}"
         ours, theirs = context.Pipe()
-        # A daemon: Ctrl-C while processes start, or whatever ends the launcher before it has told them to stop, ends them.
-        # Otherwise it would wait for them at its exit, and they for it, for ever.
+        # A daemon: Ctrl-C while processes start, or whatever ends the launcher before it has told them to stop, ends
+        # them. Otherwise it would wait for them at its exit, and they for it, for ever.
         process = context.Process(
             target=process_main, args=(name, theirs, self.setting, run, specs), name=name, daemon=True
         )

@@ -96,10 +96,11 @@ def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
     settings = {"cache": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    made: Any = numba.njit(**settings)(function)
+    made = numba.njit(**settings)(function)
+    kept: Any = made
     if isinstance(made, Dispatcher):
-        file = made._cache._cache_file
-        made._cache._cache_file = _CacheFile(file._cache_path, file._index_name[: -len(".nbi")], file._source_stamp)
+        file = kept._cache._cache_file
+        kept._cache._cache_file = _CacheFile(file._cache_path, file._index_name[: -len(".nbi")], file._source_stamp)
     return made  # type: ignore[no-any-return]
 
 
