@@ -168,7 +168,7 @@ def test_a_value_that_was_typed_is_the_value_in_force(bench, station):
 @pytest.mark.parametrize(
     ("name", "value", "why"),
     [
-        ("K11", -1.0, "must be > 0"),
+        ("K11", -1.0, "0 to 10000"),
         ("SUBSTEPS", 1.5, "whole number"),
         ("CH_LOSS", 1.5, "0 to 1"),
         ("CH_DELAY", 3.0, "exchange periods"),

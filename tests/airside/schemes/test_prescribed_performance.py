@@ -113,12 +113,12 @@ def test_networks_have_their_published_size_at_rest():
 
 
 def fatal(flown: Flight, form: str = "flight", **gains: float) -> str:
-    return "\n".join(p.text for p in LAW.check(SCHEME.gains(form, gains), flown) if p.fatal)
+    return "\n".join(p.text for p in SCHEME.check(SCHEME.gains(form, gains), flown) if p.fatal)
 
 
 def test_published_set_ups_pass_with_a_word_on_the_sufficient_condition():
     for form, period in (("monograph", 0.001), ("flight", 0.01)):
-        problems = LAW.check(SCHEME.gains(form, {}), flight(GRAPH, period, leader_climb=1.577))
+        problems = SCHEME.check(SCHEME.gains(form, {}), flight(GRAPH, period, leader_climb=1.577))
         assert [p.fatal for p in problems] == [False, False]
         assert all("(3.71)" in p.text for p in problems)
 
@@ -135,14 +135,14 @@ def test_start_outside_of_the_tube_is_refused():
 @pytest.mark.parametrize(
     ("gains", "facts", "words"),
     [
-        ({"k31": 0.0}, {}, "gain k31 = 0: must be > 0"),
+        ({"k31": 0.0}, {}, "gain k31 = 0: must be above 0"),
         ({}, {"leader_climb": 4.5}, "gain beta2 = 4 m/s: must exceed the leaders' largest climb rate"),
         ({}, {"leader_climb": 3.5}, "gain observer_limit"),
         ({"tube_last": 3.0}, {}, "must not widen"),
         ({}, {"leader_speed_varies": True}, "must be constant"),
         ({"phi": 0.01}, {}, "unstable in Euler steps"),
-        ({"horizon": -5.0}, {}, "gain horizon = -5: must be >= 0"),
-        ({"cap": -0.5}, {}, "gain cap = -0.5: must be >= 0"),
+        ({"horizon": -5.0}, {}, "gain horizon = -5: must be at least 0"),
+        ({"cap": -0.5}, {}, "gain cap = -0.5: must be at least 0"),
     ],
 )
 def test_gains_that_break_a_condition_are_refused(gains, facts, words):
@@ -155,5 +155,5 @@ def test_lead_filter_is_unstable_above_30_ms():
 
 
 def test_printed_inner_loop_in_slow_steps_is_warned_about():
-    texts = [p.text for p in LAW.check(SCHEME.gains("monograph", {}), flight(GRAPH, 0.01)) if not p.fatal]
+    texts = [p.text for p in SCHEME.check(SCHEME.gains("monograph", {}), flight(GRAPH, 0.01)) if not p.fatal]
     assert any("1 kHz" in text for text in texts)
