@@ -7,7 +7,7 @@ from typing import Any
 
 from ftcc.airside.scheme import Flight, Problem
 
-__all__ = ["above_leaders_climb", "largest_degree", "stable_in_steps", "weighted"]
+__all__ = ["above_leaders_climb", "largest_degree", "stable_in_steps", "starts_within_bound", "weighted"]
 
 
 def largest_degree(flight: Flight) -> float:
@@ -32,6 +32,26 @@ def stable_in_steps(rates: Mapping[str, float], step: float) -> list[Problem]:
         for name, rate in rates.items()
         if rate * step >= 2.0
     ]
+
+
+def starts_within_bound(gains: Any, flight: Flight) -> list[Problem]:
+    """Warn of UAVs whose synchronization error E = lambda1 e + lambda2 sum_j a_ij (e - e_j) starts beyond its bound."""
+    problems = []
+    low, high = -gains.k_lo * gains.eps0, gains.k_up * gains.eps0
+    for i, own in flight.initial_errors.items():
+        weights = {j: flight.graph.weights[i, j] for j in flight.graph.senders(i) if j in flight.initial_errors}
+        for n, axis in enumerate(("bank", "angle of attack", "sideslip")):
+            disagreement = sum(weight * (own[n] - flight.initial_errors[j][n]) for j, weight in weights.items())
+            error = gains.lambda1 * own[n] + gains.lambda2 * disagreement
+            if not low < error < high:
+                problems.append(
+                    Problem(
+                        False,
+                        f"UAV {i} starts with a synchronization error of {error:.3g} rad in {axis}: outside of the "
+                        f"bound at the start, {low:.3g} .. {high:.3g} rad, within which alone the law is proved",
+                    )
+                )
+    return problems
 
 
 def above_leaders_climb(gains: Any, name: str, flight: Flight, source: str) -> list[Problem]:

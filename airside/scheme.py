@@ -89,6 +89,8 @@ class Flight:
     """Largest acceleration of the leaders' profiles along either axis, m/s^2."""
     initial: Mapping[int, Reference] = field(default_factory=dict)
     """Initial speed and altitude of each follower, by id."""
+    initial_errors: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)
+    """Where UAVs refer to an attitude of their own: the error of each in bank, alpha and sideslip at the start, rad."""
 
 
 class Problem(NamedTuple):

@@ -10,18 +10,21 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftcc.airside.references.profiles import Profile, climb_range, largest_acceleration
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
+from ftcc.airside.spec import OwnReference
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Start
 from ftcc.groundside.table import LEADING
 from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
+from ftcc.link.rotation import wrapped
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
-from ftcc.sim.plant import GAMMA, TRUTH, V, X, Z
+from ftcc.sim.plant import ALPHA, BETA, GAMMA, MU, TRUTH, V, X, Z
 from ftcc.sim.spec import VehicleSpec
 
 __all__ = [
@@ -331,6 +334,7 @@ def check_scheme(
     timing: Timing,
     vehicles: list[VehicleSpec],
     profiles: dict[int, Profile],
+    references: Mapping[int, OwnReference | None],
     findings: Findings,
 ) -> Flight:
     """The scheme's own conditions on gains and mission, which is returned; each follower's gains must meet them."""
@@ -347,6 +351,7 @@ def check_scheme(
         leader_speed_varies=bool(speeds - known) or any(p.speed_wave for p in profiles.values()),
         leader_acceleration=largest_acceleration(profiles, plan.duration),
         initial={vehicle.uav: _motion(vehicle) for vehicle in vehicles if vehicle.uav in graph.followers},
+        initial_errors=_initial_errors(scheme, vehicles, references),
     )
     alike: dict[Any, list[int]] = {}
     for uav in graph.followers:
@@ -383,11 +388,30 @@ def briefings(
     return known
 
 
-def _motion(vehicle: VehicleSpec) -> Reference:
-    """The motion of an aircraft at its start."""
+def _initial_errors(
+    scheme: Scheme, vehicles: list[VehicleSpec], references: Mapping[int, OwnReference | None]
+) -> dict[int, tuple[float, float, float]]:
+    """By UAV, where schemes refer to an attitude: by how much the first one is missed, rad."""
+    errors = {}
+    for vehicle in vehicles if scheme.plant == "attitude" else ():
+        own, true = references[vehicle.uav], _truth(vehicle)
+        if own is not None:
+            mu, alpha, beta = own.initial[:3]
+            errors[vehicle.uav] = (float(wrapped(true[MU] - mu)), float(true[ALPHA] - alpha), float(true[BETA] - beta))
+    return errors
+
+
+def _truth(vehicle: VehicleSpec) -> NDArray[np.float64]:
+    """The state of an aircraft at its start, in the order of ``TRUTH``."""
     plant = plants.find(vehicle.plant)
     true = np.zeros(len(TRUTH))
     plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
+    return true
+
+
+def _motion(vehicle: VehicleSpec) -> Reference:
+    """The motion of an aircraft at its start."""
+    true = _truth(vehicle)
     speed, gamma = float(true[V]), float(true[GAMMA])
     climb, forward = speed * math.sin(gamma), speed * math.cos(gamma)
     return Reference(x=float(true[X]), V=speed, V_dot=0.0, z=float(true[Z]), z_dot=climb, z_ddot=0.0, x_dot=forward)

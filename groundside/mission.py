@@ -141,7 +141,7 @@ def resolve(scenario: Scenario) -> Mission:
 
     flight = None
     if gains:
-        flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, findings)
+        flight = check_scheme(plan, scheme, gains, graph, timing, vehicles, profiles, references, findings)
         estimates = min(scheme.climb_limit(gains[uav]) for uav in graph.followers)
         profiles = limited(plan, profiles, sheet, limits[THRUST], estimates, findings)
         check_clearance(plan, profiles, findings)

@@ -37,7 +37,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree, stable_in_steps
+from ftcc.airside.conditions import largest_degree, stable_in_steps, starts_within_bound
 from ftcc.airside.elements.filters import (
     butterworth,
     robust_exact_differentiator_step,
@@ -537,7 +537,7 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
     degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
     if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
         problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))
-    return problems + _sampled_well(gains, flight.period)
+    return problems + starts_within_bound(gains, flight) + _sampled_well(gains, flight.period)
 
 
 def _sampled_well(gains: Gains, period: float) -> list[Problem]:

@@ -33,7 +33,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree, stable_in_steps
+from ftcc.airside.conditions import largest_degree, stable_in_steps, starts_within_bound
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
@@ -418,7 +418,8 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
                     f"control is held up to {_STEEPEST:g}, lost from 6.8 on; widen eps_inf or lower lambda1, lambda2",
                 )
             )
-        problems += _sampled_well(gains, flight.period)
+        problems += starts_within_bound(gains, flight)
+    problems += _sampled_well(gains, flight.period)
     return problems
 
 
