@@ -46,7 +46,7 @@ IDEAL = "monograph"
 """The form with ideal exchange, which no processes can fly."""
 
 _NEGLIGIBLE = 1e-6
-"""Share of the largest weight that a UAV hears with, below which an edge is as good as none."""
+"""Share of the largest weight below which an edge is as good as none."""
 _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
 
@@ -210,10 +210,9 @@ def _warn_of_edges(graph: Graph, findings: Findings) -> None:
     for (receiver, sender), weight in graph.weights.items():
         if receiver in graph.leaders and sender in graph.followers:
             findings.warned.append(f"graph.edges: {sender} -> {receiver} is without effect: leaders hear no followers")
-        elif weight < _NEGLIGIBLE * max(graph.weights[receiver, other] for other in graph.senders(receiver)):
+        elif weight < _NEGLIGIBLE * max(graph.weights.values()):
             findings.warned.append(
-                f"graph.edges: {sender} -> {receiver} has weight {weight:g}: as good as none beside the others that "
-                f"UAV {receiver} hears"
+                f"graph.edges: {sender} -> {receiver} has weight {weight:g}: as good as none beside the others"
             )
     for leader in graph.leaders:
         if not graph.receivers(leader):
