@@ -15,7 +15,6 @@ from typing import Any, Literal, get_args, get_origin
 
 import annotated_types
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings, strategies
 from pydantic import BaseModel
 
@@ -24,7 +23,7 @@ from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.scenario import shipped
 from ftcc.groundside.simulate import fly
 
-TRIED = int(os.environ.get("FTCC_SCENARIOS", "150"))
+TRIED = int(os.environ.get("FTCC_SCENARIOS", "100"))
 SECONDS = 2.0
 NOT_FLOWN = ("title", "claims", "flown")
 """What no flight depends on."""
@@ -143,9 +142,3 @@ def test_the_fields_of_every_scenario_are_tried() -> None:
     paths = {path for _, _, changes in FIELDS for path, _ in changes}
     assert {"duration", "rates.latency", "gains.k11", "faults.0.bias", "start.uav.1.V", "fire.spread.0"} <= paths
     assert len(paths) > 500
-
-
-@pytest.mark.parametrize("duration", ["0.05", "1e-6", "1e5"])
-@pytest.mark.parametrize("name", ["nearest_neighbour", "fire_monitoring"])
-def test_very_short_and_very_long_flights_are_checked(name: str, duration: str) -> None:
-    assert resolve(load(name, settings=[f"duration={duration}"])).timing.duration <= float(duration)
