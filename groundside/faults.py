@@ -15,7 +15,7 @@ from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.plant import INTERMITTENT, STUCK, WRONG, Fault
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["actuator_faults", "check_faults", "fault_text", "navigation_faults"]
+__all__ = ["actuator_faults", "check_ends", "check_faults", "fault_texts", "navigation_faults"]
 
 _KINDS = {"stuck": STUCK, "intermittent": INTERMITTENT}
 _PARTS = {"position": navigation.POSITION, "attitude": navigation.ATTITUDE}
@@ -29,8 +29,37 @@ _NAVIGATION_KINDS = {
 }
 
 
+def _part(fault: FaultFields) -> tuple[int, str | None, str | None]:
+    """What fails: UAV, actuator, part of its navigation."""
+    return fault.uav, fault.actuator, fault.navigation
+
+
+def _repairs(plan: Plan) -> list[FaultFields]:
+    """The faults, in order of time, and a repair wherever one ends and no other of the same part begins just then."""
+    begun = {(fault.at, _part(fault)) for fault in plan.faults}
+    repairs = [
+        FaultFields(at=f.until, uav=f.uav, actuator=f.actuator, navigation=f.navigation, kind="ok")
+        for f in plan.faults
+        if f.until is not None and (f.until, _part(f)) not in begun
+    ]
+    return sorted([*plan.faults, *repairs], key=lambda f: f.at)
+
+
+def check_ends(plan: Plan, findings: Findings) -> None:
+    """Refuse a fault that begins while another one of the same part has not come to its ``until``."""
+    for n, fault in enumerate(plan.faults):
+        for m, other in enumerate(plan.faults):
+            if m == n or fault.until is None or _part(other) != _part(fault):
+                continue
+            if fault.at <= other.at < fault.until:
+                findings.refuse(
+                    f"faults.{m}.at = {other.at:g}: faults.{n} of the same part of UAV {fault.uav} lasts from "
+                    f"{fault.at:g} to {fault.until:g} s; begin after it, or leave its until out"
+                )
+
+
 def actuator_faults(plan: Plan, uav: int) -> tuple[Fault, ...]:
-    """The faults of a UAV's actuators, in order of time."""
+    """The faults of a UAV's actuators and their repairs, in order of time."""
     return tuple(
         Fault(
             f.at,
@@ -42,13 +71,13 @@ def actuator_faults(plan: Plan, uav: int) -> tuple[Fault, ...]:
             float(_KINDS.get(f.kind, WRONG)),
             **{name: getattr(f, name) for name in ("slew", "period", "duty") if getattr(f, name) is not None},
         )
-        for f in sorted(plan.faults, key=lambda f: f.at)
+        for f in _repairs(plan)
         if f.uav == uav and f.actuator is not None
     )
 
 
 def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
-    """The faults of a UAV's navigation solution, in order of time."""
+    """The faults of a UAV's navigation solution and their repairs, in order of time."""
     return tuple(
         NavigationFault(
             f.at,
@@ -59,12 +88,17 @@ def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
             *f.offset,
             *f.rate_offset,
         )
-        for f in sorted(plan.faults, key=lambda f: f.at)
+        for f in _repairs(plan)
         if f.uav == uav and f.navigation is not None
     )
 
 
-def fault_text(fault: FaultFields) -> str:
+def fault_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
+    """Begin and end of each fault as (time, UAV, text)."""
+    return [(fault.at, fault.uav, _fault_text(fault)) for fault in _repairs(plan)]
+
+
+def _fault_text(fault: FaultFields) -> str:
     """A fault in words, for the log."""
     what = fault.actuator.replace("_", " ") if fault.actuator else f"navigation ({fault.navigation})"
     if fault.kind == "ok" or (fault.kind == "wrong" and fault.actuator and (fault.effectiveness, fault.bias) == (1, 0)):
@@ -82,7 +116,7 @@ def check_faults(
     """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel.
 
     At the mission's speed, or every speed that leaders are commanded to while it lasts if they change theirs; under the
-    disturbances that act then.
+    disturbances that act then, of which those that oscillate count with their mean, 0, and in still air.
     """
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):
@@ -90,7 +124,7 @@ def check_faults(
             continue
         remaining = 0.0 if fault.kind == "off" else fault.effectiveness
         vehicle = by_uav[fault.uav]
-        later = [f.at for f in plan.faults if f.uav == fault.uav and f.actuator == fault.actuator and f.at > fault.at]
+        later = [f.at for f in _repairs(plan) if _part(f) == _part(fault) and f.at > fault.at]
         low, high = vehicle.limits[SLOT[fault.actuator]]
         times = instants(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
         for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:

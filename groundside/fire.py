@@ -43,7 +43,10 @@ def fire_commands(plan: Plan) -> tuple[Command, ...]:
     place = [fire.outbreak[axis] + fire.drift[axis] * fire.age for axis in range(2)]
     commands = [Command(0.0, place[0], place[1], *fire.drift)]
     for event in plan.fire_events:
-        commands.append(moved(commands[-1], event.at, event.centre, event.drift))
+        before = commands[-1]
+        commands.append(moved(before, event.at, event.centre, event.drift))
+        if event.until is not None:
+            commands.append(moved(commands[-1], event.until, None, (before.drift_north, before.drift_east)))
     return tuple(commands)
 
 
@@ -53,8 +56,11 @@ def posts(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int,
     fire = plan.fire
     for uav in sorted({*fire.posts} ^ {*followers}):
         findings.refuse(f"fire.posts.{uav}: " + ("is missing" if uav in followers else f"there is no UAV {uav}"))
-    if [event.at for event in plan.fire_events] != sorted({event.at for event in plan.fire_events}):
-        findings.refuse("fire_events: must stand in the order of time, one at a time")
+    changes = [command.at for command in fire_commands(plan)]
+    if changes != sorted(changes) or len({event.at for event in plan.fire_events}) < len(plan.fire_events):
+        findings.refuse(
+            "fire_events: must stand in the order of time, one at a time, each after the until of those before"
+        )
     for n, event in enumerate(plan.fire_events):
         if event.drift is not None and max(map(abs, event.drift)) >= fire.shift_speed:
             findings.refuse(
@@ -85,6 +91,8 @@ def fire_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
         )
         said += [] if event.drift is None else [f"it drifts with {event.drift[0]:g}, {event.drift[1]:g} m/s"]
         texts.append((event.at, None, f"fire: {', '.join(said)}"))
+        if event.until is not None:
+            texts.append((event.until, None, "fire: it drifts as before"))
     return texts
 
 
@@ -117,7 +125,8 @@ def _needed(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float
         if name.startswith("b_"):
             since = np.maximum(t - d.time, 0.0)
             grown = 1.0 - np.exp(-d.onset * since) if d.onset > 0.0 else 1.0
-            push[:, "xyz".index(name[2])] += np.where(t >= d.time, d.value * grown, 0.0)
+            swing = np.sin(d.frequency * since + d.phase) if d.frequency > 0.0 else 1.0
+            push[:, "xyz".index(name[2])] += np.where((t >= d.time) & (t < d.until), d.value * grown * swing, 0.0)
     v = motion[:, 3:6]
     speed = np.sqrt((v * v).sum(axis=1))
     wanted = motion[:, 6:9] - push

@@ -43,16 +43,22 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
     commands, triggers = [], []
     altitude, speed = fields.z, fields.V
     for command in fields.commands:
+        before = altitude, speed
         altitude = altitude if command.altitude is None else command.altitude
         speed = speed if command.speed is None else command.speed
         if command.at is not None:
             commands.append(Command(command.at, altitude, speed))
+            if command.until is not None:
+                altitude, speed = before
+                commands.append(Command(command.until, altitude, speed))
         elif command.x is not None:
             triggers.append(Trigger(uav if command.uav is None else command.uav, command.x, altitude, speed))
     if fields.over_obstacles:
         triggers = _reaction(plan, uav)
     if commands != sorted(commands, key=lambda c: c.at):
-        findings.refuse(f"leaders.{uav}.commands: must stand in the order of time")
+        findings.refuse(
+            f"leaders.{uav}.commands: must stand in the order of time, each after the until of those before"
+        )
     profile = Profile(
         x=fields.x,
         z=fields.z,

@@ -31,7 +31,7 @@ from ftcc.groundside.checks import (
     timing_of,
 )
 from ftcc.groundside.claims import check_claims
-from ftcc.groundside.faults import actuator_faults, check_faults, fault_text, navigation_faults
+from ftcc.groundside.faults import actuator_faults, check_ends, check_faults, fault_texts, navigation_faults
 from ftcc.groundside.fire import check_posts
 from ftcc.groundside.leaders import check_clearance, limited, profiles_of
 from ftcc.groundside.links import link_changes, link_texts
@@ -40,6 +40,7 @@ from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, PointMassSheet, RateLimits
 from ftcc.groundside.table import LEADING
 from ftcc.groundside.trims import check_starts, check_trims, level_trim
+from ftcc.groundside.wind import check_wind, discrete_gusts, gust, mean_wind, turbulence, wind_texts
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
@@ -48,7 +49,7 @@ from ftcc.link.timing import Timing
 from ftcc.sim import plants
 from ftcc.sim.airframe import scaled
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Guards, Gust
+from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Guards
 from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
 
 __all__ = ["Mission", "resolve"]
@@ -113,6 +114,8 @@ def resolve(scenario: Scenario) -> Mission:
     wire = scenario.form != IDEAL
     timing = timing_of(plan, wire, findings)
     plant = plant_of(plan, scheme, findings)
+    check_ends(plan, findings)
+    check_wind(plan, plant, findings)
     limits = limits_of(plan, plant, findings)
     graph = graph_of(plan, scheme, findings)
     sheet = load_airframe(plan.airframe, scenario.file)
@@ -125,7 +128,7 @@ def resolve(scenario: Scenario) -> Mission:
     findings.stop_if_refused()
     model = _nominal(plan, sheet, limits)
     code = _code(model, plant)
-    vehicles = [_aircraft(plan, uav, plant, true, limits, code, findings) for uav in graph.followers]
+    vehicles = [_aircraft(plan, uav, plant, true, limits, code, timing, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
     findings.stop_if_refused()
     check_starts(plan, plant, vehicles, findings)
@@ -251,6 +254,7 @@ def _aircraft(
     airframe: tuple[float, ...],
     limits: tuple[tuple[float, float], ...],
     code: AttitudeCode,
+    timing: Timing,
     findings: Findings,
 ) -> VehicleSpec:
     own = plan.start.uav.get(uav)
@@ -286,18 +290,28 @@ def _aircraft(
         damping=_by_slot(plan.plant.damping, plant),
         delay=plan.plant.delay,
         holds_first=isinstance(plan.plant.initial_actuators, dict),
-        gust=_gust(plan, channels, findings),
+        gust=gust(plan),
+        discrete_gusts=discrete_gusts(plan, uav, start["V"], findings),
+        turbulence=turbulence(plan, uav, start["V"], timing),
         attitude_code=code,
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=actuator_faults(plan, uav),
         navigation_faults=navigation_faults(plan, uav),
         disturbances=tuple(
-            Disturbance(d.at, float(channels.index(name)), value, d.onset)
+            Disturbance(
+                d.at,
+                float(channels.index(name)),
+                value,
+                d.onset,
+                math.inf if d.until is None else d.until,
+                d.frequency or 0.0,
+                d.phase,
+            )
             for d in sorted(plan.disturbances, key=lambda d: d.at)
             if d.uavs is None or uav in d.uavs
             for name, value in d.values.items()
         )
-        + _mean_wind(plan, channels),
+        + mean_wind(plan, channels),
         noise=tuple(float(getattr(noise, name, 0.0)) * noise.factor for name in TRUTH),
         guards=_guards(plan),
         offset=start.get("y", 0.0),
@@ -310,20 +324,6 @@ def _code(model: Model, plant: ModuleType) -> AttitudeCode:
     if not getattr(plant, "BY_ATTITUDE", False):
         return UNCODED
     return AttitudeCode(2.0 * model.m * model.g / (model.rho * model.S), model.CL0, model.CLa)
-
-
-def _mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:
-    if plan.wind is None or plan.wind.mean == 0.0 or "wind" not in channels:
-        return ()
-    return (Disturbance(0.0, float(channels.index("wind")), plan.wind.mean, 0.0),)
-
-
-def _gust(plan: Plan, channels: list[str], findings: Findings) -> Gust:
-    if plan.wind is None:
-        return Gust()
-    if "gust" not in channels:
-        findings.refuse("wind: the plant flies in still air")
-    return Gust(plan.wind.gust, round(plan.wind.gust_period * 1e6), plan.seed)
 
 
 def _guards(plan: Plan) -> Guards:
@@ -360,26 +360,30 @@ def _reference_point(
 
 
 def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str], ...]:
-    events: list[tuple[float, int | None, str]] = []
-    for fault in plan.faults:
-        events.append((fault.at, fault.uav, fault_text(fault)))
+    events = fault_texts(plan)
+    units = dict(plant.DISTURBANCES)
     for disturbance in plan.disturbances:
-        units = dict(plant.DISTURBANCES)
-        text = "disturbance " + ", ".join(f"{name} = {v:g} {units[name]}" for name, v in disturbance.values.items())
-        if disturbance.uavs is None:
-            events.append((disturbance.at, None, text))
-        else:
-            events += [(disturbance.at, uav, text) for uav in disturbance.uavs]
+        values = disturbance.values
+        text = "disturbance " + ", ".join(f"{name} = {v:g} {units[name]}" for name, v in values.items())
+        if disturbance.frequency is not None:
+            text += f", oscillating with {disturbance.frequency:g} rad/s"
+        for uav in [None] if disturbance.uavs is None else disturbance.uavs:
+            events.append((disturbance.at, uav, text))
+            if disturbance.until is not None:
+                events.append((disturbance.until, uav, f"disturbance {', '.join(values)} over"))
     for uav, leader in plan.leaders.items():
         for command in leader.commands:
             if command.at is not None:
                 asked = [f"{command.altitude:g} m"] if command.altitude is not None else []
                 asked += [f"{command.speed:g} m/s"] if command.speed is not None else []
                 events.append((command.at, uav, f"leader commanded to {', '.join(asked)}"))
+            if command.until is not None:
+                events.append((command.until, uav, "leader commanded as before"))
         if leader.cosine is not None:
             events.append((leader.cosine.at, uav, "leader begins its cosine in altitude"))
     events += reference_texts(plan)
     events += link_texts(plan.link_events)
+    events += wind_texts(plan)
     ends = plan.duration + 1e-9
     return tuple(sorted((event for event in events if event[0] <= ends), key=lambda e: (e[0], e[1] or 0, e[2])))
 

@@ -49,10 +49,19 @@ def _attitude(plan: Plan, uav: int, timing: Timing, findings: Findings) -> OwnRe
         if given.uavs is not None and uav not in given.uavs:
             continue
         if given.at < command.at:
-            findings.refuse(f"attitude.commands.{n}.at = {given.at:g}: must stand in the order of time")
+            findings.refuse(
+                f"attitude.commands.{n}.at = {given.at:g}: must stand in the order of time, each after the until of "
+                f"those before"
+            )
+        if given.until is not None and not commands:
+            findings.refuse(f"attitude.commands.{n}.until: the first command of UAV {uav} has none before it")
+        before = command
         asked = {"mu": given.bank, "alpha": given.alpha, "beta": given.sideslip}
         command = command._replace(at=given.at, **{axis: value for axis, value in asked.items() if value is not None})
         commands.append(command)
+        if given.until is not None:
+            command = before._replace(at=given.until)
+            commands.append(command)
     if not commands or commands[0].at > 0.0:
         findings.refuse(f"attitude.commands: UAV {uav} has no command at = 0, at which its reference starts")
         commands.insert(0, command._replace(at=0.0))
@@ -74,8 +83,8 @@ def reference_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
             if (value := getattr(command, name)) is not None
         ]
         text = f"commanded to {', '.join(asked)}"
-        if command.uavs is None:
-            events.append((command.at, None, text))
-        else:
-            events += [(command.at, uav, text) for uav in command.uavs]
+        for uav in [None] if command.uavs is None else command.uavs:
+            events.append((command.at, uav, text))
+            if command.until is not None:
+                events.append((command.until, uav, "commanded to the attitude before"))
     return events

@@ -30,9 +30,13 @@ def level_trim(
 
 
 def disturbances_at(vehicle: VehicleSpec, plant: ModuleType, at: float) -> dict[str, float]:
-    """The disturbances of a vehicle at ``at`` (s) by name, as they are once they have set in."""
+    """The disturbances of a vehicle at ``at`` (s) by name, once they have set in; of those that oscillate the mean, 0."""
     return {
-        name: sum(d.value for d in vehicle.disturbances if d.channel == channel and d.time <= at)
+        name: sum(
+            d.value
+            for d in vehicle.disturbances
+            if d.channel == channel and d.time <= at < d.until and d.frequency == 0.0
+        )
         for channel, (name, _) in enumerate(plant.DISTURBANCES)
     }
 
@@ -54,7 +58,7 @@ def speeds_at(plan: Plan, profiles: dict[int, Profile], uav: int, at: float) -> 
 def instants(plan: Plan, profiles: dict[int, Profile], vehicle: VehicleSpec, begin: float, end: float) -> list[float]:
     """``begin`` and the later times before ``end`` (s) at which another level flight is asked of a vehicle."""
     times = {command.at for p in profiles.values() for command in p.commands}
-    times |= {disturbance.time for disturbance in vehicle.disturbances}
+    times |= {time for disturbance in vehicle.disturbances for time in (disturbance.time, disturbance.until)}
     return sorted({begin} | {t for t in times if begin < t < min(end, plan.duration)})
 
 

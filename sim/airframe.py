@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Airframe", "Deflections", "attitude_rates", "longitudinal_rates", "scaled"]
+__all__ = ["Airframe", "Deflections", "attitude_rates", "longitudinal_rates", "scaled", "turning_rates"]
 
 
 class Airframe(NamedTuple):
@@ -125,6 +125,24 @@ def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
 
 
 @compiled
+def turning_rates(gamma, mu, alpha, beta, p, q, r, chi_dot, gamma_dot):
+    """Rates of (mu, alpha, beta), the attitude against a path, under body rates and the path's own, eqs. (2.3)."""
+    sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
+    sin_beta, cos_beta = math.sin(beta), math.cos(beta)
+    sin_mu, cos_mu = math.sin(mu), math.cos(mu)
+    sin_gamma, cos_gamma = math.sin(gamma), math.cos(gamma)
+    tan_beta = sin_beta / cos_beta
+    about_velocity = p * cos_alpha + r * sin_alpha
+    lift_axis = chi_dot * cos_gamma * sin_mu + gamma_dot * cos_mu
+    side_axis = chi_dot * cos_gamma * cos_mu - gamma_dot * sin_mu
+    return (
+        about_velocity / cos_beta + chi_dot * sin_gamma + lift_axis * tan_beta,
+        q - tan_beta * about_velocity - lift_axis / cos_beta,
+        p * sin_alpha - r * cos_alpha + side_axis,
+    )
+
+
+@compiled
 def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder, thrust, d1, d2, d3, a):
     """Rates of (V, chi, gamma, mu, alpha, beta, p, q, r), eqs. (2.2)-(2.7).
 
@@ -146,7 +164,6 @@ def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder
     sin_beta, cos_beta = math.sin(beta), math.cos(beta)
     sin_mu, cos_mu = math.sin(mu), math.cos(mu)
     sin_gamma, cos_gamma = math.sin(gamma), math.cos(gamma)
-    tan_beta = sin_beta / cos_beta
     # Forces and moments, (2.6)-(2.7).
     lifting = 0.5 * a.rho * V * V * a.S
     half_span = 0.5 * a.b / V
@@ -167,13 +184,7 @@ def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder
     chi_dot = (lift * sin_mu + side * cos_mu + turning) / (momentum * cos_gamma)
     climbing = thrust * (cos_alpha * sin_beta * sin_mu + sin_alpha * cos_mu)
     gamma_dot = (lift * cos_mu - side * sin_mu + climbing) / momentum - a.g * cos_gamma / V + d2
-    # Attitude against the path, (2.3).
-    about_velocity = p * cos_alpha + r * sin_alpha
-    lift_axis = chi_dot * cos_gamma * sin_mu + gamma_dot * cos_mu
-    side_axis = chi_dot * cos_gamma * cos_mu - gamma_dot * sin_mu
-    mu_dot = about_velocity / cos_beta + chi_dot * sin_gamma + lift_axis * tan_beta
-    alpha_dot = q - tan_beta * about_velocity - lift_axis / cos_beta
-    beta_dot = p * sin_alpha - r * cos_alpha + side_axis
+    mu_dot, alpha_dot, beta_dot = turning_rates(gamma, mu, alpha, beta, p, q, r, chi_dot, gamma_dot)
     # Body rates, (2.4)-(2.5).
     inertia = a.Ix * a.Iz - a.Ixz * a.Ixz
     c1 = ((a.Iy - a.Iz) * a.Iz - a.Ixz * a.Ixz) / inertia

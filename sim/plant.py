@@ -120,8 +120,15 @@ class Disturbance(NamedTuple):
     channel: float
     """Index into the plant's ``DISTURBANCES``."""
     value: float
+    """Constant value, or amplitude, in the channel's unit."""
     onset: float
     """Rate of the exponential onset, 1/s; 0 = step."""
+    until: float = math.inf
+    """When it ends, as a step, s."""
+    frequency: float = 0.0
+    """Of value * sin(frequency * (t - time) + phase), rad/s; 0 = constant."""
+    phase: float = 0.0
+    """rad."""
 
 
 class Autothrottle(NamedTuple):
@@ -192,7 +199,7 @@ class Fleet(NamedTuple):
     updates: NDArray[np.int64]
     """(k, 2): updates of a slow solution that are past."""
     disturbances: NDArray[np.float64]
-    """(k, n, 4): see `Disturbance`; unused rows have time inf."""
+    """(k, n, 7): see `Disturbance`; unused rows have time inf."""
     code: NDArray[np.float64]
     """(k, 3): see `AttitudeCode`."""
     gust_deviation: NDArray[np.float64]
@@ -200,6 +207,14 @@ class Fleet(NamedTuple):
     gust_period_us: NDArray[np.int64]
     """(k,)."""
     gust_seed: NDArray[np.int64]
+    """(k,)."""
+    gusts: NDArray[np.float64]
+    """(k, n, 6): see ``wind.DiscreteGust``; unused rows have time inf."""
+    dryden: NDArray[np.float64]
+    """(k, 3, 6): see ``wind.dryden``; zeros without turbulence."""
+    turbulence: NDArray[np.float64]
+    """(k, 3, 2): the states of its filters."""
+    turbulence_seed: NDArray[np.int64]
     """(k,)."""
     guards: NDArray[np.float64]
     """(k, 4): see `Guards`."""
@@ -270,9 +285,11 @@ def disturbance(fleet, i, channel, time):
     """The sum of the disturbances of a channel of vehicle ``i`` at ``time`` (s)."""
     total = 0.0
     for n in range(fleet.disturbances.shape[1]):
-        since = time - fleet.disturbances[i, n, 0]
-        if since >= 0.0 and int(fleet.disturbances[i, n, 1]) == channel:
-            total += fleet.disturbances[i, n, 2] * _onset(since, fleet.disturbances[i, n, 3])
+        row = fleet.disturbances[i, n]
+        since = time - row[0]
+        if since >= 0.0 and time < row[4] and int(row[1]) == channel:
+            swing = math.sin(row[5] * since + row[6]) if row[5] > 0.0 else 1.0
+            total += row[2] * _onset(since, row[3]) * swing
     return total
 
 

@@ -17,6 +17,7 @@ from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.obstacles import Obstacle, zones_of
 from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards, Gust
 from ftcc.sim.plants import find
+from ftcc.sim.wind import NO_TURBULENCE, DiscreteGust, Turbulence, dryden, settled
 
 __all__ = ["NO_AUTOTHROTTLE", "VehicleSpec", "build", "placeholder"]
 
@@ -62,6 +63,8 @@ class VehicleSpec:
     holds_first: bool = False
     """Whether ``command`` stays in force for that delay; otherwise the first command received is in force at once."""
     gust: Gust = CALM
+    discrete_gusts: tuple[DiscreteGust, ...] = ()
+    turbulence: Turbulence = NO_TURBULENCE
     attitude_code: AttitudeCode = UNCODED
     """Whether and how commands come as attitude targets."""
     target: tuple[float, ...] = (0.0,) * 7
@@ -114,6 +117,10 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         gust_deviation=np.array([spec.gust.deviation for spec in specs], np.float64),
         gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),
+        gusts=_padded([spec.discrete_gusts for spec in specs], len(DiscreteGust._fields)),
+        dryden=np.array([dryden(spec.turbulence) for spec in specs]),
+        turbulence=np.array([settled(spec.turbulence, spec.uav) for spec in specs]),
+        turbulence_seed=np.array([spec.turbulence.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
         faults=_free(specs, "faults", len(Fault._fields)),
         fault_count=np.zeros(k, np.int64),

@@ -9,6 +9,7 @@ from ftcc.groundside.schema.fire import PointMassSheet
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
 from ftcc.groundside.schema.plan import Claim, Plan, fields_of
 from ftcc.groundside.schema.references import LeaderFields
+from ftcc.groundside.schema.wind import TurbulenceFields
 from ftcc.groundside.schema.world import FaultFields
 
 __all__ = [
@@ -26,5 +27,6 @@ __all__ = [
     "RateLimits",
     "Start",
     "Strict",
+    "TurbulenceFields",
     "fields_of",
 ]

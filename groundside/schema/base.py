@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Actuator", "Id", "NotNegative", "Positive", "Probability", "Strict"]
+__all__ = ["Actuator", "Id", "NotNegative", "Positive", "Probability", "Strict", "check_end"]
 
 Id = Annotated[int, Field(ge=1, le=200)]
 """MAVLink system id of a UAV."""
@@ -20,3 +20,9 @@ class Strict(BaseModel):
     """Fields that are not listed, nan and inf are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def check_end(at: float, until: float | None) -> None:
+    """Refuse an event that ends before, or when, it begins; raises ValueError."""
+    if until is not None and until <= at:
+        raise ValueError(f"until = {until:g} must be later than at = {at:g}")

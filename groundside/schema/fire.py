@@ -1,4 +1,4 @@
-"""What may stand in a scenario of chapter 9: the fire and the posts around it, wind, and its point-mass aircraft."""
+"""What may stand in a scenario of chapter 9: the fire and the posts around it, and its point-mass aircraft."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Id, NotNegative, Positive, Strict
+from ftcc.groundside.schema.base import Id, NotNegative, Positive, Strict, check_end
 
-__all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields", "WindFields"]
+__all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields"]
 
 
 class PointMassSheet(Strict):
@@ -56,9 +56,13 @@ class FireFields(Strict):
 
 
 class FireEventFields(Strict):
-    """From ``at`` on the fire's centre is elsewhere, or drifts otherwise, for all UAVs at once."""
+    """From ``at`` on the fire's centre is elsewhere, or drifts otherwise, for all UAVs at once.
+
+    A drift may end: from ``until`` on the centre drifts as before. A centre stays where it has come to.
+    """
 
     at: float = Field(gt=0.0, description="s")
+    until: float | None = Field(None, description="s, of a drift; default: until the next event")
     centre: tuple[float, float] | None = Field(None, description="m, north and east at that time; default: where it is")
     drift: tuple[float, float] | None = Field(None, description="m/s, north and east; default: as before")
 
@@ -66,12 +70,7 @@ class FireEventFields(Strict):
     def _changes_something(self) -> Self:
         if self.centre is None and self.drift is None:
             raise ValueError("needs some of centre, drift")
+        if self.until is not None and self.drift is None:
+            raise ValueError("until goes with drift; a centre stays where it has come to")
+        check_end(self.at, self.until)
         return self
-
-
-class WindFields(Strict):
-    """Wind and gust, eq. (9.33)."""
-
-    mean: float = Field(0.0, ge=0.0, description="m/s, V_m")
-    gust: float = Field(0.0, ge=0.0, description="m/s, standard deviation of A, drawn for each UAV")
-    gust_period: float = Field(0.1, ge=0.001, description="s, for which a draw is held")

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Id, Probability, Strict
+from ftcc.groundside.schema.base import Id, Probability, Strict, check_end
 
 __all__ = ["ChannelFields", "EdgeFields", "GraphFields", "LinkEventFields"]
 
@@ -77,8 +77,7 @@ class LinkEventFields(Strict):
     def _consistent(self) -> Self:
         if (self.uav is None) == (self.edge is None):
             raise ValueError("needs either uav = n or edge = [sender, receiver]")
-        if self.until is not None and self.until <= self.at:
-            raise ValueError(f"until = {self.until:g} must be later than at = {self.at:g}")
+        check_end(self.at, self.until)
         if self.directed and self.edge is None:
             raise ValueError("directed goes with edge")
         if bool(self.changes) != (self.kind == "degrade"):

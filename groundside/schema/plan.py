@@ -8,9 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ftcc.groundside.schema.aircraft import Plant, Starts
 from ftcc.groundside.schema.base import Id, Strict
-from ftcc.groundside.schema.fire import FireEventFields, FireFields, WindFields
+from ftcc.groundside.schema.fire import FireEventFields, FireFields
 from ftcc.groundside.schema.network import ChannelFields, GraphFields, LinkEventFields
 from ftcc.groundside.schema.references import AttitudeFields, LeaderFields
+from ftcc.groundside.schema.wind import GustFields, TurbulenceFields, WindFields
 from ftcc.groundside.schema.world import DisturbanceFields, FaultFields, HomeFields, NoiseFields, ObstacleFields
 
 __all__ = ["Claim", "Plan", "fields_of"]
@@ -109,6 +110,8 @@ class Plan(Strict):
     fire: FireFields | None = None
     fire_events: list[FireEventFields] = []
     wind: WindFields | None = None
+    gusts: list[GustFields] = []
+    turbulence: TurbulenceFields | None = None
     leaders: dict[Id, LeaderFields] = {}
     obstacles: list[ObstacleFields] = []
     detection_range: float | None = Field(None, gt=0.0, description="m, at which the leaders detect an obstacle ahead")

@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Id, Strict
+from ftcc.groundside.schema.base import Id, Strict, check_end
 
 __all__ = ["AttitudeFields", "LeaderFields"]
 
@@ -19,9 +19,13 @@ class Filter(Strict):
 
 
 class CommandFields(Strict):
-    """From ``at`` on, or once leader ``uav`` has passed ``x``: another altitude, another speed."""
+    """From ``at`` on, or once leader ``uav`` has passed ``x``: another altitude, another speed.
+
+    From ``until`` on what was commanded before is commanded again.
+    """
 
     at: float | None = Field(None, ge=0.0, description="s")
+    until: float | None = Field(None, description="s, goes with at; default: until the next command")
     uav: Id | None = None
     x: float | None = Field(None, description="m, forward position")
     altitude: float | None = Field(None, description="m; default: as before")
@@ -31,6 +35,10 @@ class CommandFields(Strict):
     def _by_time_or_position(self) -> Self:
         if (self.at is None) == (self.x is None):
             raise ValueError("needs either at = seconds, or x = position (and uav = the leader that passes it)")
+        if self.until is not None:
+            if self.at is None:
+                raise ValueError("until goes with at; a command by position stands until the next one")
+            check_end(self.at, self.until)
         return self
 
 
@@ -74,9 +82,13 @@ class LeaderFields(Strict):
 
 
 class AttitudeCommandFields(Strict):
-    """From ``at`` on: another commanded attitude with respect to the velocity; what is not given stays."""
+    """From ``at`` on: another commanded attitude with respect to the velocity; what is not given stays.
+
+    From ``until`` on the attitude that was commanded before is commanded again.
+    """
 
     at: float = Field(ge=0.0, description="s")
+    until: float | None = Field(None, description="s; default: until the next command")
     bank: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
     alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
     sideslip: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
@@ -86,6 +98,7 @@ class AttitudeCommandFields(Strict):
     def _commands_something(self) -> Self:
         if self.bank is None and self.alpha is None and self.sideslip is None:
             raise ValueError("needs some of bank, alpha, sideslip")
+        check_end(self.at, self.until)
         return self
 
 

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Actuator, Id, Probability, Strict
+from ftcc.groundside.schema.base import Actuator, Id, Probability, Strict, check_end
 
 __all__ = ["DisturbanceFields", "FaultFields", "HomeFields", "NoiseFields", "ObstacleFields"]
 
@@ -25,9 +25,14 @@ class ObstacleFields(Strict):
 
 
 class DisturbanceFields(Strict):
-    """Constant disturbances from ``at`` on, as far as the plant has them."""
+    """Disturbances from ``at`` to ``until``, as far as the plant has them: constant, or oscillating at ``frequency``.
+
+    Each value then is the amplitude of value * sin(frequency * (t - at) + phase). The onset grows towards it; the end
+    is a step.
+    """
 
     at: float = Field(ge=0.0, description="s")
+    until: float | None = Field(None, description="s, when it ends, as a step; without it the disturbance is for good")
     d1: float = Field(0.0, description="m/s^2, of the airspeed")
     d2: float = Field(0.0, description="rad/s, of the flight-path angle")
     d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
@@ -35,17 +40,28 @@ class DisturbanceFields(Strict):
     b_y: float = Field(0.0, description="m/s^2, east")
     b_z: float = Field(0.0, description="m/s^2, up")
     onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
+    frequency: float | None = Field(None, gt=0.0, description="rad/s, of an oscillation; default: constant")
+    phase: float = Field(0.0, description="rad, of an oscillation at its beginning")
     uavs: list[Id] | None = Field(None, description="default: all followers")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        check_end(self.at, self.until)
+        if self.frequency is None and "phase" in self.model_fields_set:
+            raise ValueError("phase goes with frequency, of an oscillation")
+        return self
 
     @property
     def values(self) -> dict[str, float]:
         """The disturbances that are not zero, by name."""
-        given = {name: getattr(self, name) for name in type(self).model_fields if name not in ("at", "onset", "uavs")}
+        given = {name: getattr(self, name) for name in ("d1", "d2", "d3", "b_x", "b_y", "b_z")}
         return {name: value for name, value in given.items() if value != 0.0}
 
 
 class FaultFields(Strict):
-    """From ``at`` on an ``actuator``, or the ``navigation`` solution, fails, until another fault of it.
+    """From ``at`` on an ``actuator``, or the ``navigation`` solution, fails, until another fault of it, or ``until``.
+
+    At ``until`` it is repaired, as by ``kind = "ok"``; another fault of the same part may begin only then.
 
     Actuators: wrong: effectiveness * position + bias; off: effectiveness 0; stuck: holds its deflection; slow: moves at
     ``slew`` at most; intermittent: healthy for a share of each period, else as wrong. Navigation: wrong: with an
@@ -54,6 +70,7 @@ class FaultFields(Strict):
     """
 
     at: float = Field(ge=0.0, description="s")
+    until: float | None = Field(None, description="s, when it is repaired; without it the fault is for good")
     uav: Id
     actuator: Actuator | None = None
     navigation: Literal["position", "attitude"] | None = None
@@ -83,6 +100,9 @@ class FaultFields(Strict):
         lossy = {"effectiveness", "bias", "effectiveness_onset", "bias_onset"}
         sizes = {"wrong": lossy, "intermittent": lossy} if self.actuator else {"wrong": {"offset", "rate_offset"}}
         always = {"at", "uav", "actuator", "navigation", "kind", "without_trim"}
+        if self.kind != "ok":
+            always |= {"until"}
+        check_end(self.at, self.until)
         extra = given - always - needed - sizes.get(self.kind, set())
         if extra:
             raise ValueError(f"kind = {self.kind!r} takes no {', '.join(sorted(extra))}")

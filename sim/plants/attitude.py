@@ -1,4 +1,9 @@
-"""The aircraft in six degrees of freedom, eqs. (2.1)-(2.7): aileron, elevator, rudder and thrust."""
+"""The aircraft in six degrees of freedom, eqs. (2.1)-(2.7): aileron, elevator, rudder and thrust.
+
+States are over the ground: V, chi and gamma are those of the velocity over the ground, mu, alpha and beta the attitude
+against it, and that is what is measured; in still air it is the velocity through the air. Forces and moments are those
+of the air velocity. The mean wind blows north.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
-from ftcc.link.rotation import wrapped
-from ftcc.sim.airframe import Airframe, Deflections, attitude_rates
+from ftcc.link.rotation import body_attitude, wrapped
+from ftcc.sim.airframe import Airframe, Deflections, attitude_rates, turning_rates
 from ftcc.sim.plant import (
     AIRSPEED,
     ALPHA,
@@ -30,6 +35,7 @@ from ftcc.sim.plant import (
     Z,
 )
 from ftcc.sim.plants.longitudinal import DISTURBANCES, Disturbances, level
+from ftcc.sim.wind import acceleration, against, wind_speed
 
 __all__ = [
     "ACTUATORS",
@@ -52,7 +58,7 @@ __all__ = [
 
 
 class State(NamedTuple):
-    """Motion of a rigid aircraft in still air."""
+    """Motion of a rigid aircraft over the ground."""
 
     x: float
     """Position north, m."""
@@ -61,7 +67,7 @@ class State(NamedTuple):
     z: float
     """Altitude, m."""
     V: float
-    """Airspeed, m/s."""
+    """Speed over the ground, m/s."""
     chi: float
     """Course, rad; not wrapped."""
     gamma: float
@@ -69,9 +75,9 @@ class State(NamedTuple):
     mu: float
     """Bank about the velocity, rad; not wrapped."""
     alpha: float
-    """Angle of attack, rad."""
+    """Angle of attack against the velocity over the ground, rad."""
     beta: float
-    """Sideslip, rad."""
+    """Sideslip likewise, rad."""
     p: float
     q: float
     r: float
@@ -87,12 +93,40 @@ START = ("V", "x", "y", "z", "gamma", "theta", "q", "chi", "mu", "alpha", "beta"
 
 
 @compiled
+def _rates_in_wind(s, u, d, a):
+    """As `attitude_rates`, where the air moves."""
+    cg, sg, cc, sc = math.cos(s.gamma), math.sin(s.gamma), math.cos(s.chi), math.sin(s.chi)
+    q0, q1, q2, q3 = body_attitude(s.chi, s.gamma, s.mu, s.alpha, s.beta)
+    speed, gamma, chi, mu, alpha, beta = against(
+        q0, q1, q2, q3,
+        s.V * cg * cc - wind_speed(s.z, d.wind, d.gust) - d.wind_along * cc + d.wind_right * sc,
+        s.V * cg * sc - d.wind_along * sc - d.wind_right * cc,
+        s.V * sg - d.wind_up,
+    )  # fmt: skip
+    speed_rate, chi_rate, gamma_rate, _, _, _, p_dot, q_dot, r_dot = attitude_rates(
+        speed, gamma, mu, alpha, beta, s.p, s.q, s.r,
+        u.aileron, u.elevator, u.rudder, u.thrust, 0.0, 0.0, d.d3, a,
+    )  # fmt: skip
+    # The rates of the air path in still air are the acceleration on its triad, whatever the wind does.
+    north, east, up = acceleration(speed, gamma, chi, speed_rate, gamma_rate, chi_rate)
+    V_dot = cg * (north * cc + east * sc) + up * sg + d.d1
+    chi_dot = (east * cc - north * sc) / (s.V * cg)
+    gamma_dot = (up * cg - sg * (north * cc + east * sc)) / s.V + d.d2
+    mu_dot, alpha_dot, beta_dot = turning_rates(s.gamma, s.mu, s.alpha, s.beta, s.p, s.q, s.r, chi_dot, gamma_dot)
+    return V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot
+
+
+@compiled
 def rates(s, u, d, a):
     """Rates of `State` under the deflections ``u`` and disturbances ``d`` of the airframe ``a``."""
-    V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot = attitude_rates(
-        s.V, s.gamma, s.mu, s.alpha, s.beta, s.p, s.q, s.r,
-        u.aileron, u.elevator, u.rudder, u.thrust, d.d1, d.d2, d.d3, a,
-    )  # fmt: skip
+    still = d.wind == 0.0 and d.gust == 0.0 and d.wind_along == 0.0 and d.wind_right == 0.0 and d.wind_up == 0.0
+    if still:
+        V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot = attitude_rates(
+            s.V, s.gamma, s.mu, s.alpha, s.beta, s.p, s.q, s.r,
+            u.aileron, u.elevator, u.rudder, u.thrust, d.d1, d.d2, d.d3, a,
+        )  # fmt: skip
+    else:
+        V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot = _rates_in_wind(s, u, d, a)
     ground = s.V * math.cos(s.gamma)
     return (
         ground * math.cos(s.chi),
@@ -112,7 +146,7 @@ def rates(s, u, d, a):
 
 @compiled
 def airspeed(s):
-    """Airspeed, m/s."""
+    """Speed over the ground, m/s; in still air the airspeed."""
     return s.V
 
 

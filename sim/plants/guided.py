@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
-from ftcc.link.rotation import body_axes
 from ftcc.sim.airframe import Airframe, attitude_rates
 from ftcc.sim.inner_loop import LoopState, deflections, load_factor, loop_rates
 from ftcc.sim.plant import (
@@ -34,8 +33,9 @@ from ftcc.sim.plant import (
     Z,
 )
 from ftcc.sim.plants.attitude import COMPLETED, complete
-from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Disturbances, Inputs, wind_speed
+from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Disturbances, Inputs
 from ftcc.sim.trim import trim
+from ftcc.sim.wind import acceleration, against, wind_speed
 
 __all__ = [
     "ACTUATORS",
@@ -119,17 +119,7 @@ class Level(NamedTuple):
 @compiled
 def _against(s, vx, vy, vz):
     """Speed, path angle, course, bank, angle of attack and sideslip of the attitude against a velocity (z up)."""
-    ground = math.sqrt(vx * vx + vy * vy)
-    speed = math.sqrt(ground * ground + vz * vz)
-    gamma, chi = math.atan2(vz, ground), math.atan2(vy, vx)
-    nose, wing, belly = body_axes(s.q0, s.q1, s.q2, s.q3)
-    u = nose[0] * vx + nose[1] * vy - nose[2] * vz
-    v = wing[0] * vx + wing[1] * vy - wing[2] * vz
-    w = belly[0] * vx + belly[1] * vy - belly[2] * vz
-    alpha, beta = math.atan2(w, u), math.atan2(v, math.sqrt(u * u + w * w))
-    sideways = wing[1] * math.cos(chi) - wing[0] * math.sin(chi)
-    downwards = wing[2] * math.cos(gamma) + math.sin(gamma) * (wing[0] * math.cos(chi) + wing[1] * math.sin(chi))
-    return speed, gamma, chi, math.atan2(downwards, sideways), alpha, beta
+    return against(s.q0, s.q1, s.q2, s.q3, vx, vy, vz)
 
 
 @compiled
@@ -142,13 +132,19 @@ def _surface_rate(wanted, position):
 def rates(s, u, d, a):
     """Rates of `State` under the demands ``u`` and disturbances ``d`` of the airframe ``a``; the wind blows north."""
     thrust = max(u.thrust, 0.0)
-    speed, gamma, chi, mu, alpha, beta = _against(s, s.vx - wind_speed(s.z, d.wind, d.gust), s.vy, s.vz)
+    vx, vy, vz = s.vx - wind_speed(s.z, d.wind, d.gust), s.vy, s.vz
+    if d.wind_along != 0.0 or d.wind_right != 0.0 or d.wind_up != 0.0:
+        ground = math.sqrt(s.vx * s.vx + s.vy * s.vy)
+        cos_chi, sin_chi = s.vx / ground, s.vy / ground
+        vx -= d.wind_along * cos_chi - d.wind_right * sin_chi
+        vy -= d.wind_along * sin_chi + d.wind_right * cos_chi
+        vz -= d.wind_up
+    speed, gamma, chi, mu, alpha, beta = _against(s, vx, vy, vz)
     V_dot, chi_dot, gamma_dot, _, _, _, p_dot, q_dot, r_dot = attitude_rates(
         speed, gamma, mu, alpha, beta, s.p, s.q, s.r, s.aileron, s.elevator, s.rudder, thrust, 0.0, 0.0, 0.0, a
     )
     # The rates of the air path in still air are the acceleration on its triad, whatever the wind does.
-    right, up = speed * math.cos(gamma) * chi_dot, speed * gamma_dot
-    cg, sg, cc, sc = math.cos(gamma), math.sin(gamma), math.cos(chi), math.sin(chi)
+    north, east, up = acceleration(speed, gamma, chi, V_dot, gamma_dot, chi_dot)
     loop = LoopState(s.n_r, s.n_r_dot, s.mu_r, s.integral)
     n_r, n_r_dot, mu_r, integral = loop_rates(
         loop, u.load_factor, u.bank, load_factor(speed, alpha, s.elevator, thrust, a)
@@ -160,9 +156,9 @@ def rates(s, u, d, a):
         s.vx,
         s.vy,
         s.vz,
-        V_dot * cg * cc - right * sc - up * sg * cc + d.b_x,
-        V_dot * cg * sc + right * cc - up * sg * sc + d.b_y,
-        V_dot * sg + up * cg + d.b_z,
+        north + d.b_x,
+        east + d.b_y,
+        up + d.b_z,
         0.5 * (-s.q1 * s.p - s.q2 * s.q - s.q3 * s.r),
         0.5 * (s.q0 * s.p + s.q2 * s.r - s.q3 * s.q),
         0.5 * (s.q0 * s.q - s.q1 * s.r + s.q3 * s.p),

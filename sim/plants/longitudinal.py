@@ -1,7 +1,13 @@
-"""The aircraft in its vertical plane, eqs. (2.8)-(2.12): thrust and elevator."""
+"""The aircraft in its vertical plane, eqs. (2.8)-(2.12): thrust and elevator.
+
+States are over the ground: V and gamma are those of the velocity over the ground, which is what is measured; in still
+air they are airspeed and climb against the air. Forces and moment are those of the air velocity. It flies north, as the
+mean wind blows; a wind from the side has no effect in the plane.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -9,6 +15,7 @@ from ftcc.link.compiled import compiled
 from ftcc.sim.airframe import Airframe, Deflections, longitudinal_rates
 from ftcc.sim.plant import AIRSPEED, ALPHA, CLIMB, GAMMA, INCIDENCE, NUMBER, THETA, Q, V, X, Y, Z
 from ftcc.sim.trim import Trim, trim
+from ftcc.sim.wind import AIR_CHANNELS, wind_speed
 
 __all__ = [
     "ACTUATORS",
@@ -34,7 +41,7 @@ class State(NamedTuple):
     """Longitudinal motion."""
 
     V: float
-    """Airspeed, m/s."""
+    """Speed over the ground, m/s."""
     x: float
     """Forward position, m."""
     z: float
@@ -48,17 +55,22 @@ class State(NamedTuple):
 
 
 class Disturbances(NamedTuple):
-    """Added to the rates, see `DISTURBANCES`."""
+    """Added to the rates, and the motion of the air, see `DISTURBANCES`."""
 
     d1: float
     d2: float
     d3: float
+    wind: float = 0.0
+    gust: float = 0.0
+    wind_along: float = 0.0
+    wind_right: float = 0.0
+    wind_up: float = 0.0
 
 
 Inputs = Deflections
 Parameters = Airframe
 ACTUATORS = ("thrust", "elevator")
-DISTURBANCES = (("d1", "m/s^2"), ("d2", "rad/s"), ("d3", "rad/s^2"))
+DISTURBANCES = (("d1", "m/s^2"), ("d2", "rad/s"), ("d3", "rad/s^2"), *AIR_CHANNELS)
 COMPLETED = ("alpha",)
 SERVES = ("longitudinal",)
 START = ("V", "x", "y", "z", "gamma", "theta", "q")
@@ -67,12 +79,30 @@ START = ("V", "x", "y", "z", "gamma", "theta", "q")
 @compiled
 def rates(s, u, d, a):
     """Rates of `State` under the deflections ``u`` and disturbances ``d`` of the airframe ``a``."""
-    return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a)
+    ahead = wind_speed(s.z, d.wind, d.gust) + d.wind_along
+    if ahead == 0.0 and d.wind_up == 0.0:
+        return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a)
+    vx, vz = s.V * math.cos(s.gamma), s.V * math.sin(s.gamma)
+    forward, climb = vx - ahead, vz - d.wind_up
+    speed, gamma = math.sqrt(forward * forward + climb * climb), math.atan2(climb, forward)
+    # The rates of the air path in still air are the acceleration along and across it, whatever the wind does.
+    along, _, _, turning, _, q_dot = longitudinal_rates(
+        speed, gamma, s.theta, s.q, u.thrust, u.elevator, 0.0, 0.0, d.d3, a
+    )
+    across, apart = speed * turning, gamma - s.gamma
+    return (
+        along * math.cos(apart) - across * math.sin(apart) + d.d1,
+        vx,
+        vz,
+        (along * math.sin(apart) + across * math.cos(apart)) / s.V + d.d2,
+        s.q,
+        q_dot,
+    )
 
 
 @compiled
 def airspeed(s):
-    """Airspeed, m/s."""
+    """Speed over the ground, m/s; in still air the airspeed."""
     return s.V
 
 
@@ -109,5 +139,5 @@ def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> tuple[fl
 
 
 def level(airframe: Airframe, V: float, **disturbances: float) -> Trim:
-    """Level flight at ``V`` (m/s) under constant disturbances; raises TrimError where there is none."""
-    return trim(airframe, V, **disturbances)
+    """Level flight at ``V`` (m/s) in still air under constant disturbances; raises TrimError where there is none."""
+    return trim(airframe, V, **{name: disturbances.get(name, 0.0) for name in ("d1", "d2", "d3")})

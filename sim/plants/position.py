@@ -1,7 +1,9 @@
 """The aircraft as a point, eqs. (2.15)-(2.16): thrust, load factor and bank; drag (9.32) in the wind of (9.33).
 
 Integrated as one acceleration of the velocity, which has no singularity in climb: an inner loop of the attitude is
-taken for granted, `ftcc.sim.plant` gives it its lag.
+taken for granted, `ftcc.sim.plant` gives it its lag. That loop holds load factor and bank against gusts and turbulence
+too: these change the drag, and the direction of the forces, which are those of the air velocity. Wind and gust of
+(9.33) enter the drag alone, as printed. States and what is measured are over the ground.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from typing import NamedTuple
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import wrapped
 from ftcc.sim.plant import AIRSPEED, CHI, CLIMB, GAMMA, MU, NUMBER, THETA, V, X, Y, Z
+from ftcc.sim.wind import AIR_CHANNELS, wind_speed
 
 __all__ = [
     "ACTUATORS",
@@ -65,8 +68,11 @@ class Disturbances(NamedTuple):
     b_x: float
     b_y: float
     b_z: float
-    wind: float
-    gust: float
+    wind: float = 0.0
+    gust: float = 0.0
+    wind_along: float = 0.0
+    wind_right: float = 0.0
+    wind_up: float = 0.0
 
 
 class Parameters(NamedTuple):
@@ -93,21 +99,13 @@ class Level(NamedTuple):
 
 ACTUATORS = ("thrust", "load_factor", "bank")
 COMPLETED = ("theta",)
-DISTURBANCES = (("b_x", "m/s^2"), ("b_y", "m/s^2"), ("b_z", "m/s^2"), ("wind", "m/s"), ("gust", "m/s"))
-"""Accelerations north, east and up; mean wind V_m and gust A of (9.33), along the track."""
+DISTURBANCES = (("b_x", "m/s^2"), ("b_y", "m/s^2"), ("b_z", "m/s^2"), *AIR_CHANNELS)
+"""Accelerations north, east and up; mean wind V_m and gust A of (9.33), along the track; the motion of the air."""
 SERVES = ("position",)
 START = ("V", "x", "y", "z", "gamma", "chi")
 
 _LEAST_AIRSPEED = 1.0
 """Guard of the induced drag against division by zero, m/s."""
-
-
-@compiled
-def wind_speed(z, mean, gust):
-    """Wind (m/s) at the altitude ``z`` (m), eq. (9.33)."""
-    if mean == 0.0:
-        return gust
-    return 0.215 * mean * math.log10(max(z, 1.0)) + 0.285 * mean + gust
 
 
 @compiled
@@ -123,10 +121,16 @@ def drag(airspeed, load_factor, a):
 @compiled
 def rates(s, u, d, a):
     """Rates of `State` under the inputs ``u`` and disturbances ``d``; thrust cannot brake, whatever its fault says."""
-    ground = math.sqrt(s.vx * s.vx + s.vy * s.vy)
-    speed = math.sqrt(ground * ground + s.vz * s.vz)
-    cos_gamma, sin_gamma = ground / speed, s.vz / speed
-    cos_chi, sin_chi = s.vx / ground, s.vy / ground
+    vx, vy, vz = s.vx, s.vy, s.vz
+    ground = math.sqrt(vx * vx + vy * vy)
+    if d.wind_along != 0.0 or d.wind_right != 0.0 or d.wind_up != 0.0:
+        vx -= (d.wind_along * s.vx - d.wind_right * s.vy) / ground
+        vy -= (d.wind_along * s.vy + d.wind_right * s.vx) / ground
+        vz -= d.wind_up
+        ground = math.sqrt(vx * vx + vy * vy)
+    speed = math.sqrt(ground * ground + vz * vz)
+    cos_gamma, sin_gamma = ground / speed, vz / speed
+    cos_chi, sin_chi = vx / ground, vy / ground
     along = (max(u.thrust, 0.0) - drag(speed - wind_speed(s.z, d.wind, d.gust), u.load_factor, a)) / a.m
     right = a.g * u.load_factor * math.sin(u.bank)
     up = a.g * u.load_factor * math.cos(u.bank)

@@ -1,0 +1,197 @@
+"""Moving air: the mean wind of chapter 9, discrete gusts, Dryden turbulence, and motion relative to the air.
+
+Gusts and turbulence have three components: along the track (tail wind > 0), to its right, and up, m/s. Aircraft are
+small against them: the air moves as a whole, its gradients over span and length (p_g, q_g, r_g of MIL-F-8785C) are
+neglected. Distances become times by the speed that the scenario gives: the field is frozen and flown through steadily.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.compiled import compiled, compiled_within
+from ftcc.link.philox import TURBULENCE, gaussian_pair, philox
+from ftcc.link.rotation import body_axes
+
+__all__ = [
+    "AIR",
+    "AIR_CHANNELS",
+    "NO_TURBULENCE",
+    "DiscreteGust",
+    "Turbulence",
+    "acceleration",
+    "against",
+    "blow",
+    "dryden",
+    "moving_air",
+    "settled",
+    "wind_speed",
+]
+
+AIR = ("wind_along", "wind_right", "wind_up")
+"""The last of a plant's ``DISTURBANCES``: what gusts and turbulence make of the air's velocity."""
+
+AIR_CHANNELS = (("wind", "m/s"), ("gust", "m/s"), *((name, "m/s") for name in AIR))
+"""Mean wind V_m and gust A of (9.33), then `AIR`."""
+
+
+class DiscreteGust(NamedTuple):
+    """Columns of ``Fleet.gusts``: (1 - cos(pi x / d_m)) / 2 of each component, in time (MIL-F-8785C, 3.7.1.3)."""
+
+    time: float
+    """s."""
+    rise: float
+    """Time in which the length d_m is flown, s."""
+    along: float
+    """m/s."""
+    right: float
+    up: float
+    until: float = math.inf
+    """From here on it falls as it has risen; time + rise: the whole 1-cosine of CS-25.341."""
+
+
+class Turbulence(NamedTuple):
+    """Dryden turbulence on a vehicle (MIL-F-8785C, 3.7.1.2), by component: along, right, up."""
+
+    deviation: tuple[float, float, float] = (0.0,) * 3
+    """sigma, m/s."""
+    bandwidth: tuple[float, float, float] = (1.0,) * 3
+    """V / L, rad/s."""
+    step_us: int = 1000
+    """Integration step of the plant, for which a value is held."""
+    seed: int = 0
+
+
+NO_TURBULENCE = Turbulence()
+
+
+def dryden(turbulence: Turbulence) -> NDArray[np.float64]:
+    """The exact discrete form of the filters: a row (sigma, decay, feed, l11, l21, l22) per component.
+
+    With a = V/L and white noise n: z' = -a z + sqrt(2 a) n, r' = a (z - r), both with a stationary z of variance 1. The
+    air moves by sigma z along the track, spectrum 1/(1 + (L w/V)^2), and by sigma (sqrt(3) z + (1 - sqrt(3)) r)/sqrt(2)
+    across, spectrum (1 + 3 (L w/V)^2)/(1 + (L w/V)^2)^2. Over a step z and r get noise of the covariance l l^T.
+    """
+    rows = np.zeros((3, 6))
+    for n, (deviation, bandwidth) in enumerate(zip(turbulence.deviation, turbulence.bandwidth, strict=True)):
+        turn = bandwidth * turbulence.step_us / 1e6
+        # Integrals of 2 exp(-2 t) times 1, t and t^2 up to `turn`, without the cancellation of their closed forms.
+        first, mixed, second = _tail(1, 2.0 * turn), 0.5 * _tail(2, 2.0 * turn), 0.5 * _tail(3, 2.0 * turn)
+        l11 = math.sqrt(first)
+        l21 = mixed / l11
+        decay = math.exp(-turn)
+        rows[n] = deviation, decay, turn * decay, l11, l21, math.sqrt(max(second - l21 * l21, 0.0))
+    return rows
+
+
+def _tail(terms: int, y: float) -> float:
+    """exp(-y) times the exponential series without its first ``terms``, y >= 0."""
+    term, total, n = y**terms / math.factorial(terms), 0.0, terms
+    while total + term != total:
+        total, n = total + term, n + 1
+        term *= y / n
+    return math.exp(-y) * total
+
+
+def settled(turbulence: Turbulence, uav: int) -> NDArray[np.float64]:
+    """States (3, 2) at the start, drawn from their stationary distribution: var z = 1, var r = cov(z, r) = 1/2."""
+    draws = _normal(turbulence.seed, 0, uav)
+    return np.array([(z, 0.5 * z + 0.5 * r) for z, r in (draws[0:2], draws[2:4], draws[4:6])])
+
+
+@compiled
+def _normal(seed, draw, uav):
+    """Six independent standard normal numbers of a vehicle, for this draw."""
+    a, b, c, d = philox(seed, draw & 0xFFFFFFFF, uav, TURBULENCE, 0)
+    e, f, _, _ = philox(seed, draw & 0xFFFFFFFF, uav, TURBULENCE, 1)
+    n0, n1 = gaussian_pair(a, b)
+    n2, n3 = gaussian_pair(c, d)
+    n4, n5 = gaussian_pair(e, f)
+    return n0, n1, n2, n3, n4, n5
+
+
+@compiled_within
+def _drive(state, row, first, second):
+    z = state[0]
+    state[0] = row[1] * z + row[3] * first
+    state[1] = row[1] * state[1] + row[2] * z + row[4] * first + row[5] * second
+
+
+@compiled
+def blow(fleet, i, step):
+    """Bring the turbulence of vehicle ``i`` to the beginning of this step, counted from 1, of its plant."""
+    rows = fleet.dryden[i]
+    if rows[0, 0] == 0.0 and rows[1, 0] == 0.0 and rows[2, 0] == 0.0:
+        return
+    n0, n1, n2, n3, n4, n5 = _normal(fleet.turbulence_seed[i], step, fleet.uav[i])
+    _drive(fleet.turbulence[i, 0], rows[0], n0, n1)
+    _drive(fleet.turbulence[i, 1], rows[1], n2, n3)
+    _drive(fleet.turbulence[i, 2], rows[2], n4, n5)
+
+
+@compiled_within
+def _cosine(since, rise):
+    return 0.5 * (1.0 - math.cos(math.pi * since / rise)) if since < rise else 1.0
+
+
+@compiled
+def moving_air(fleet, i, component, time):
+    """How fast the air moves at vehicle ``i`` and ``time`` (s): a component, see `AIR`, m/s."""
+    speed = 0.0
+    for n in range(fleet.gusts.shape[1]):
+        row = fleet.gusts[i, n]
+        if time >= row[0]:
+            grown = _cosine(time - row[0], row[1])
+            if time >= row[5]:
+                grown = 1.0 - _cosine(time - row[5], row[1])
+            speed += row[2 + component] * grown
+    deviation, z, r = (
+        fleet.dryden[i, component, 0],
+        fleet.turbulence[i, component, 0],
+        fleet.turbulence[i, component, 1],
+    )
+    if deviation > 0.0:
+        if component > 0:
+            z = (math.sqrt(3.0) * z + (1.0 - math.sqrt(3.0)) * r) / math.sqrt(2.0)
+        speed += deviation * z
+    return speed
+
+
+@compiled
+def wind_speed(z, mean, gust):
+    """Wind (m/s) at the altitude ``z`` (m), eq. (9.33)."""
+    if mean == 0.0:
+        return gust
+    return 0.215 * mean * math.log10(max(z, 1.0)) + 0.285 * mean + gust
+
+
+@compiled
+def against(q0, q1, q2, q3, vx, vy, vz):
+    """Speed, path angle, course, bank, angle of attack and sideslip of an attitude against a velocity (z up)."""
+    ground = math.sqrt(vx * vx + vy * vy)
+    speed = math.sqrt(ground * ground + vz * vz)
+    gamma, chi = math.atan2(vz, ground), math.atan2(vy, vx)
+    nose, wing, belly = body_axes(q0, q1, q2, q3)
+    u = nose[0] * vx + nose[1] * vy - nose[2] * vz
+    v = wing[0] * vx + wing[1] * vy - wing[2] * vz
+    w = belly[0] * vx + belly[1] * vy - belly[2] * vz
+    alpha, beta = math.atan2(w, u), math.atan2(v, math.sqrt(u * u + w * w))
+    sideways = wing[1] * math.cos(chi) - wing[0] * math.sin(chi)
+    downwards = wing[2] * math.cos(gamma) + math.sin(gamma) * (wing[0] * math.cos(chi) + wing[1] * math.sin(chi))
+    return speed, gamma, chi, math.atan2(downwards, sideways), alpha, beta
+
+
+@compiled
+def acceleration(speed, gamma, chi, speed_rate, gamma_rate, chi_rate):
+    """North, east and up, of a velocity whose speed, path angle and course change at these rates."""
+    right, up = speed * math.cos(gamma) * chi_rate, speed * gamma_rate
+    cg, sg, cc, sc = math.cos(gamma), math.sin(gamma), math.cos(chi), math.sin(chi)
+    return (
+        speed_rate * cg * cc - right * sc - up * sg * cc,
+        speed_rate * cg * sc + right * cc - up * sg * sc,
+        speed_rate * sg + up * cg,
+    )
