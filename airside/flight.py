@@ -19,7 +19,7 @@ from ftcc.link.exchange import append, begin
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, wait
-from ftcc.link.timing import ticks_a_second
+from ftcc.link.timing import tick_of, ticks_a_second
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, MAIL, WORK
 from ftcc.link.wire import (
     BY_ATTITUDE,
@@ -211,9 +211,9 @@ def something_to_do(group, timing, now_us):
 def take(group, timing, i):
     """Take in the datagram at hand for UAV ``i``; one that was answered already is answered once more."""
     stamp, told = read_state(group.wire, group.arrived[i], group.arrived_controls[i])
-    if stamp < 0:
+    n = tick_of(stamp, timing.period_us)
+    if n < 0:
         return DATAGRAM
-    n = stamp // timing.period_us
     if n > group.done[i]:
         group.pending[i], group.told[i] = n, told
     elif n == group.done[i]:

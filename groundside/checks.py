@@ -17,7 +17,7 @@ from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.airside.spec import OwnReference
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
-from ftcc.groundside.schema import Plan, Start
+from ftcc.groundside.schema import Plan, Rates, Start
 from ftcc.groundside.table import LEADING
 from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
@@ -47,6 +47,9 @@ IDEAL = "monograph"
 
 _NEGLIGIBLE = 1e-6
 """Share of the largest weight below which an edge is as good as none."""
+_OFF_GRID = 0.01
+"""By how much a period may miss whole microseconds, as rates are written in decimals, us."""
+
 _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
 
@@ -100,21 +103,10 @@ def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:
 
 
 def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
-    """The time grid; between processes (``wire``) the control period is a whole number of ms."""
+    """The time grid; between processes (``wire``) the control period is at least 1 ms."""
     rates = plan.rates
-    period = 1e6 / rates.control_rate
-    step = rates.plant_step * 1e6
-    grid, allowed = (1000, "1 ms") if wire else (500, "0.5 ms")
-    if not whole(period / grid):
-        findings.refuse(
-            f"rates.control_rate = {rates.control_rate:g}: a period of {period / 1e3:g} ms; "
-            f"must be a multiple of {allowed}"
-        )
-    if not whole(period / step):
-        findings.refuse(
-            f"rates.plant_step = {rates.plant_step:g}: must divide the control period of {period / 1e3:g} ms "
-            f"into whole steps"
-        )
+    period, step = 1e6 / rates.control_rate, rates.plant_step * 1e6
+    _check_grid(rates, period, step, wire, findings)
     exchange = 1e6 / rates.exchange_rate if rates.exchange_rate else period
     latency = 0.0
     if wire:
@@ -149,13 +141,35 @@ def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
     period_us = max(1, round(period))
     return Timing(
         period_us=period_us,
-        exchange_us=round(exchange),
+        exchange_us=max(1, round(exchange / period)) * period_us,
         latency_us=round(latency),
         step_us=max(1, round(step)),
         ticks=int(plan.duration * 1e6 / period_us + 1e-6),
         record_every=max(1, round(every)),
         seed=plan.seed,
     )
+
+
+def _check_grid(rates: Rates, period: float, step: float, wire: bool, findings: Findings) -> None:
+    """Refuse a control period or a plant's step (us) that is off the grid."""
+    where = f"rates.control_rate = {rates.control_rate:g}: a period of {period / 1e3:.9g} ms; "
+    least = 1000.0 if wire else 500.0
+    if abs(period - round(period)) > _OFF_GRID:
+        near = max(round(period / step), 1) * step
+        findings.refuse(
+            f"{where}must be whole microseconds, the grid of simulated time; near it is {1e6 / near:.6g} Hz, "
+            f"a period of {near / 1e3:g} ms"
+        )
+    elif period < least - _OFF_GRID:
+        why = ", or the ms stamps of MAVLink would not tell ticks apart" if wire else ""
+        findings.refuse(f"{where}must be at least {least / 1e3:g} ms{why}")
+    if abs(step - round(step)) > _OFF_GRID:
+        findings.refuse(f"rates.plant_step = {rates.plant_step:g}: must be whole microseconds")
+    elif not whole(period / step):
+        findings.refuse(
+            f"rates.plant_step = {rates.plant_step:g}: must divide the control period of {period / 1e3:g} ms "
+            f"into whole steps"
+        )
 
 
 def check_delays(plan: Plan, timing: Timing, findings: Findings) -> None:

@@ -6,13 +6,24 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["Timing", "ticks_a_second"]
+__all__ = ["Timing", "tick_of", "ticks_a_second"]
 
 
 @compiled
 def ticks_a_second(period_us):
     """Ticks in a second, as nearly as the period allows."""
     return max(1, round(1e6 / period_us))
+
+
+@compiled
+def tick_of(stamp_us, period_us):
+    """The tick whose time is ``stamp_us`` but for what a stamp in whole ms leaves out; -1 if there is none.
+
+    MAVLink's time_boot_ms is the time rounded down. As long as a period is at least 1 ms, no two ticks share a ms: the
+    tick is found without doubt, and its time is tick * period, not the stamp.
+    """
+    tick = (stamp_us + period_us - 1) // period_us
+    return tick if stamp_us >= 0 and tick * period_us // 1000 == stamp_us // 1000 else -1
 
 
 class Timing(NamedTuple):

@@ -288,7 +288,7 @@ def send_position_target(wire, i, target):
     """Send a leader's target (stamp s, x, y, z, vx, vy, vz; z up) to its reference point; z is down on the wire."""
     payload = wire.payload
     clear(payload)
-    payload.words[0] = round(target[0] * 1e3)
+    payload.words[0] = round(target[0] * 1e6) // 1000
     payload.floats[_TARGET_X] = target[1]
     payload.floats[_TARGET_X + 1] = target[2]
     payload.floats[_TARGET_X + 2] = -target[3]
@@ -309,8 +309,8 @@ def read_state(wire, state, controls):
     Returns
     -------
     stamp, told : int
-        Its stamp in us, and whether the command in force came with it; (-1, 0) if the datagram is anything but one
-        state.
+        Its stamp in us, rounded down to whole ms (see ``timing.tick_of``), and whether the command in force came with
+        it; (-1, 0) if the datagram is anything but one state.
     """
     payload, end = wire.payload, wire.length[0]
     number, at = read_frame(wire.datagram, 0, end, payload)
@@ -328,7 +328,7 @@ def read_state(wire, state, controls):
     if at == end:
         return stamp, 0
     number, at = read_frame(wire.datagram, at, end, payload)
-    if number != ACTUATORS.number or payload.longs[0] != stamp or at != end:
+    if number != ACTUATORS.number or payload.longs[0] // 1000 != milliseconds or at != end:
         return -1, 0
     for n in range(4):
         controls[n] = payload.floats[_CONTROLS + n]
@@ -354,7 +354,7 @@ def read_command(wire, controls):
 
 @compiled_apart
 def read_attitude_target(wire, target):
-    """The attitude target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    """The attitude target in the datagram at hand: its stamp in us (whole ms), or -1 if it is anything else."""
     if not _read_alone(wire, ATTITUDE_TARGET):
         return -1
     for n in range(4):
@@ -365,7 +365,7 @@ def read_attitude_target(wire, target):
 
 @compiled_apart
 def read_position_target(wire, target):
-    """The leader's target in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    """The leader's target in the datagram at hand: its stamp in us (whole ms), or -1 if it is anything else."""
     if not _read_alone(wire, POSITION_TARGET):
         return -1
     payload = wire.payload

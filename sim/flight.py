@@ -14,7 +14,7 @@ from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, pause, wait
-from ftcc.link.timing import ticks_a_second
+from ftcc.link.timing import tick_of, ticks_a_second
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, HELD, WORK
 from ftcc.link.wire import (
     BY_ACTUATORS,
@@ -172,16 +172,26 @@ def know(group, timing):
 
 
 @compiled_within
-def _read_command(group, i):
-    """The stamp of the command in the datagram at hand for vehicle ``i``; -1 if there is none, -2 if it is too old."""
+def _read_command(group, timing, i):
+    """The time (us) of the state that the command in the datagram at hand for vehicle ``i`` answers.
+
+    -1 if there is no command, -2 if it is too old.
+    """
     wire = group.wire
-    if group.travels_by[i] == BY_POSITION:
-        return read_position_target(wire, group.targets[i])
     if group.travels_by[i] == BY_ACTUATORS:
         return read_command(wire, group.received[i])
-    stamp = read_attitude_target(wire, group.attitude)
-    if stamp < 0:
+    if group.travels_by[i] == BY_POSITION:
+        stamp = read_position_target(wire, group.target)
+    else:
+        stamp = read_attitude_target(wire, group.attitude)
+    n = tick_of(stamp, timing.period_us)
+    if n < 0:
         return -1
+    stamp = n * timing.period_us
+    if group.travels_by[i] == BY_POSITION:
+        copy(group.target, group.targets[i])
+        group.targets[i, 0] = stamp / 1e6
+        return stamp
     for n in range(group.paths.shape[1]):
         if group.path_stamps[i, n] == stamp:
             V, gamma, chi = group.paths[i, n, 0], group.paths[i, n, 1], group.paths[i, n, 2]
@@ -192,9 +202,9 @@ def _read_command(group, i):
 
 
 @compiled_within
-def take(group, i):
+def take(group, timing, i):
     """Take in the datagram at hand for vehicle ``i``: its command counts, if it is one; else its cause."""
-    stamp = _read_command(group, i)
+    stamp = _read_command(group, timing, i)
     if stamp == -1:
         return DATAGRAM
     if group.alive[i] == 0:
@@ -206,7 +216,7 @@ def take(group, i):
 
 
 @compiled_within
-def listen(group, until):
+def listen(group, timing, until):
     """Read what the autopilots sent: until all have answered ``until`` (us); if it is negative, all that came."""
     for i in range(group.alive.shape[0]):
         for _ in range(_DATAGRAMS):
@@ -214,7 +224,7 @@ def listen(group, until):
                 break
             if not receive_datagram(group.wire, i):
                 break
-            cause = take(group, i)
+            cause = take(group, timing, i)
             if cause != GO_ON:
                 return cause
     return GO_ON
@@ -269,7 +279,7 @@ def fly(group, timing, lockstep):
         over = group.tick[0] > timing.ticks or not group.alive.any()
         held = group.tick[0] > group.limit[0] and not over
         wanted = _now(group, timing) - timing.period_us if lockstep and not held else -1
-        cause = listen(group, wanted)
+        cause = listen(group, timing, wanted)
         if cause != GO_ON:
             return cause
         answered = wanted < 0 or _all_answered(group, wanted)

@@ -55,7 +55,9 @@ class VehicleGroup(NamedTuple):
     targets: NDArray[np.float64]
     """(k, 7): the newest targets of reference points."""
     attitude: NDArray[np.float64]
-    """(5,): room for an attitude target."""
+    """(5,): room for an attitude target,"""
+    target: NDArray[np.float64]
+    """(7,): and for one of a reference point."""
     latched: NDArray[np.float64]
     """(4,): room for a command on its way into force."""
     answered: NDArray[np.int64]
@@ -114,6 +116,7 @@ def build_group(specs: Sequence[VehicleSpec], rows: Rows, truth_every: int) -> V
         received=np.zeros((k, 4)),
         targets=np.zeros((k, 7)),
         attitude=np.zeros(len(TARGET)),
+        target=np.zeros(7),
         latched=np.zeros(4),
         answered=np.full(k, -1, np.int64),
         path_stamps=np.full((k, PATHS), -1, np.int64),

@@ -177,7 +177,7 @@ class Vehicles:
         """What may be the first half of a failure."""
         for message in split(wire, self.pilots[i].codec):
             if message is None:
-                self.flight.take(self.group, i)
+                self.flight.take(self.group, self.timing, i)
             elif ends(message):
                 self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
             else:
@@ -257,4 +257,4 @@ def load_compiled(group: VehicleGroup, timing: Timing, flight: ModuleType) -> No
     group.limit[0] = -1
     flight.fly(group, timing, True)
     group.limit[0] = limit
-    flight.take(group, 0)
+    flight.take(group, timing, 0)

@@ -7,7 +7,7 @@ from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, RateLim
 from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.fire import PointMassSheet
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
-from ftcc.groundside.schema.plan import Claim, Plan, fields_of
+from ftcc.groundside.schema.plan import Claim, Plan, Rates, fields_of
 from ftcc.groundside.schema.references import LeaderFields
 from ftcc.groundside.schema.wind import TurbulenceFields
 from ftcc.groundside.schema.world import FaultFields
@@ -25,6 +25,7 @@ __all__ = [
     "Plan",
     "PointMassSheet",
     "RateLimits",
+    "Rates",
     "Start",
     "Strict",
     "TurbulenceFields",

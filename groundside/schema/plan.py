@@ -14,7 +14,7 @@ from ftcc.groundside.schema.references import AttitudeFields, LeaderFields
 from ftcc.groundside.schema.wind import GustFields, TurbulenceFields, WindFields
 from ftcc.groundside.schema.world import DisturbanceFields, FaultFields, HomeFields, NoiseFields, ObstacleFields
 
-__all__ = ["Claim", "Plan", "fields_of"]
+__all__ = ["Claim", "Plan", "Rates", "fields_of"]
 
 
 class Uavs(Strict):
@@ -27,7 +27,7 @@ class Uavs(Strict):
 class Rates(Strict):
     """The time grid. Ideal exchange (form "monograph") has no exchange period and no latency of its own."""
 
-    control_rate: float = Field(gt=0.0, le=2000.0, description="Hz")
+    control_rate: float = Field(gt=0.0, le=2000.0, description="Hz; the period is whole microseconds")
     exchange_rate: float | None = Field(None, gt=0.0, le=2000.0, description="Hz, records to the neighbours")
     latency: float | None = Field(None, ge=0.0, description="s, link latency; default: one exchange period")
     plant_step: float = Field(0.001, gt=0.0, le=0.01, description="s, integration step of the plant")

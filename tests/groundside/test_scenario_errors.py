@@ -50,7 +50,17 @@ def test_malformed_toml_is_reported_with_its_line(tmp_path: Path) -> None:
         ({"settings": ["faults.7.at=1"]}, ["faults.7.at", "2 entries"]),
         ({"settings": ["loss"]}, ["--set loss", "key.path=value"]),
         ({"settings": ["rates.control_rate=-100"]}, ["rates.control_rate = -100", "greater than 0", "Hz"]),
-        ({"settings": ["rates.control_rate=300"]}, ["rates.control_rate = 300", "3.33333 ms", "multiple of 1 ms"]),
+        ({"settings": ["rates.control_rate=300"]}, ["rates.control_rate = 300", "whole microseconds", "333.333 Hz"]),
+        (
+            {"settings": ["rates.control_rate=30"]},
+            ["rates.control_rate = 30", "near it is 30.303 Hz, a period of 33 ms"],
+        ),
+        (
+            {"settings": ["rates.control_rate=2000"]},
+            ["rates.control_rate = 2000", "at least 1 ms", "MAVLink"],
+        ),
+        ({"settings": ["rates.control_rate=80"]}, ["rates.plant_step = 0.001", "12.5 ms into whole steps"]),
+        ({"settings": ["rates.plant_step=0.0003333"]}, ["rates.plant_step = 0.0003333", "whole microseconds"]),
         ({"form": "monograph", "settings": ["rates.control_rate=3000"]}, ["rates.control_rate = 3000"]),
         ({"form": "monograph", "settings": ["rates.exchange_rate=20"]}, ["rates.exchange_rate = 20", "every tick"]),
         ({"settings": ["rates.exchange_rate=30"]}, ["rates.exchange_rate = 30", "multiple of the control period"]),

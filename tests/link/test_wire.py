@@ -117,6 +117,22 @@ def test_commands_and_targets_arrive_and_pymavlink_reads_the_same(ends: Ends) ->
     assert (message.z, message.vz, message.coordinate_frame) == (-1010.5, -1.25, 1)  # type: ignore[attr-defined]
 
 
+def test_a_stamp_between_two_ms_is_rounded_down_wherever_it_travels(ends: Ends) -> None:
+    """12.5 ms: all messages of a tick name the same ms, but for actuator commands, which name microseconds."""
+    send_state(ends.vehicle, 0, 37_500, STATE, CONTROLS, True)
+    arrived(ends.autopilot)
+    assert read_state(ends.autopilot, np.zeros(13), np.zeros(4)) == (37_000, 1)
+    send_command(ends.autopilot, 0, 37_500, CONTROLS)
+    arrived(ends.vehicle)
+    assert read_command(ends.vehicle, np.zeros(4)) == 37_500
+    send_attitude_target(ends.autopilot, 0, 37_500, np.array([1.0, 0.0, 0.0, 0.0, 0.5]))
+    arrived(ends.vehicle)
+    assert read_attitude_target(ends.vehicle, np.zeros(5)) == 37_000
+    send_position_target(ends.autopilot, 0, np.array([0.0375, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    arrived(ends.vehicle)
+    assert read_position_target(ends.vehicle, np.zeros(7)) == 37_000
+
+
 def test_the_bytes_are_those_of_pymavlink(ends: Ends) -> None:
     packer = dialect.MAVLink(None, srcSystem=3, srcComponent=AUTOPILOT)
     target = np.array([12.5, 375.0, 20.0, 1010.5, 30.0, 0.0, 1.25])
