@@ -49,7 +49,6 @@ _NEGLIGIBLE = 1e-6
 """Share of the largest weight below which an edge is as good as none."""
 _OFF_GRID = 0.01
 """By how much a period may miss whole microseconds, as rates are written in decimals, us."""
-
 _MOST_PERIODS = 30
 """Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
 

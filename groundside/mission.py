@@ -6,6 +6,7 @@ import functools
 import importlib.metadata
 import math
 import platform
+import tomllib
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -90,6 +91,15 @@ class Mission:
     def uavs(self) -> tuple[int, ...]:
         """Ids, in the order of the specs."""
         return self.graph.uavs
+
+    def with_seed(self, seed: int) -> Mission:
+        """The same mission with other random numbers: noise, links, gusts and turbulence."""
+        toml = tomli_w.dumps({**tomllib.loads(self.toml), "seed": seed})
+        vehicles = tuple(
+            replace(spec, gust=spec.gust._replace(seed=seed), turbulence=spec.turbulence._replace(seed=seed))
+            for spec in self.vehicles
+        )
+        return replace(self, timing=self.timing._replace(seed=seed), vehicles=vehicles, toml=toml)
 
     @property
     def fire(self) -> Fire | None:

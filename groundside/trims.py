@@ -30,7 +30,7 @@ def level_trim(
 
 
 def disturbances_at(vehicle: VehicleSpec, plant: ModuleType, at: float) -> dict[str, float]:
-    """The disturbances of a vehicle at ``at`` (s) by name, once they have set in; of those that oscillate the mean, 0."""
+    """The disturbances of a vehicle at ``at`` (s) by name, as set in; those that oscillate count with their mean, 0."""
     return {
         name: sum(
             d.value

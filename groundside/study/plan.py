@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 import tomllib
@@ -82,11 +81,7 @@ class Study:
     def mission_of(self, trial: Trial) -> Mission | None:
         """The mission of one flight; None if it cannot fly."""
         mission = self.combinations[trial.combination].mission
-        if mission is None:
-            return None
-        timing = mission.timing._replace(seed=trial.seed)
-        as_flown = tomli_w.dumps({**tomllib.loads(mission.toml), "seed": trial.seed})
-        return dataclasses.replace(mission, timing=timing, toml=as_flown)
+        return None if mission is None else mission.with_seed(trial.seed)
 
 
 def plan_study(

@@ -18,6 +18,7 @@ import pytest
 
 from ftcc.groundside.cases import claims_in_flight
 from ftcc.groundside.errors import UserError
+from ftcc.groundside.mission import resolve
 from ftcc.groundside.scenario import load
 from ftcc.groundside.study import Outcome, draw, flights, fly_all, plan_study, table, write
 from tests.guests import EXAMPLE, forget_schemes, install
@@ -107,6 +108,14 @@ def test_values_are_those_of_the_flight_alone(flown: tuple[Any, Path], scenario:
     assert row["later"] is None
     assert row["later holds"] is None
     assert row["wall"] > 0.0
+
+
+def test_a_seed_is_that_of_gusts_too() -> None:
+    study = plan_study("fire_monitoring", seeds=2, duration=SECONDS)
+    second, alone = study.mission_of(study.trials[1]), resolve(load("fire_monitoring", seed=2, duration=SECONDS))
+    assert second is not None
+    assert (second.vehicles, second.timing) == (alone.vehicles, alone.timing)
+    assert {spec.gust.seed for spec in alone.vehicles} == {2}
 
 
 def test_a_combination_that_is_refused_is_a_row_with_its_reason(flown: tuple[Any, Path]) -> None:
