@@ -93,6 +93,8 @@ class Autopilots(NamedTuple):
     """(k, 4): full deflection of the actuators."""
     code: NDArray[np.float64]
     """(k, 3): see `AttitudeCode`."""
+    datum: NDArray[np.float64]
+    """(k,): altitude from which that in the vehicle's messages counts, m."""
     offset: NDArray[np.float64]
     """(k,): lateral position, m."""
     profile: NDArray[np.float64]
@@ -243,6 +245,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             signals=signals,
             travel=np.array([spec.travel for spec in specs], np.float64),
             code=np.array([spec.attitude_code for spec in specs], np.float64),
+            datum=np.array([spec.datum for spec in specs], np.float64),
             offset=np.array([spec.offset for spec in specs], np.float64),
             profile=parameters,
             profile_commands=commands,

@@ -71,6 +71,8 @@ class AutopilotSpec:
     """A leader's."""
     offset: float = 0.0
     """Lateral position, m."""
+    datum: float = 0.0
+    """Altitude from which that in the vehicle's messages counts, m."""
     course: float | None = None
     """Course that `lateral_hold` keeps for a law that commands no aileron and rudder, rad; None: there is none."""
     attitude_code: AttitudeCode = UNCODED

@@ -83,8 +83,10 @@ else:
 def sense(autopilots, i, state, reported, now_us):
     """Own state of UAV ``i`` from its vehicle's messages (13,) and the command that it reports in force (4,).
 
-    ``reported`` comes as fractions of the travel and is overwritten in rad and N.
+    ``reported`` comes as fractions of the travel and is overwritten in rad and N, the position down in ``state`` from
+    the datum and is overwritten from the origin that everybody else knows.
     """
+    state[9] -= autopilots.datum[i]
     decode_command(reported, autopilots.travel[i], reported)
     decode_state(state, now_us / 1e6, reported, autopilots.own[i])
 

@@ -140,6 +140,7 @@ def resolve(scenario: Scenario) -> Mission:
     code = _code(model, plant)
     vehicles = [_aircraft(plan, uav, plant, true, limits, code, timing, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, true, limits, profiles[uav]) for uav in graph.leaders]
+    vehicles = [replace(vehicle, obstacles=obstacles, datum=plan.home.datum) for vehicle in vehicles]
     findings.stop_if_refused()
     check_starts(plan, plant, vehicles, findings)
     gains = gains_of(scenario, scheme, findings)
@@ -190,6 +191,7 @@ def resolve(scenario: Scenario) -> Mission:
             link_events=tuple(changes.get(vehicle.uav, ())),
             profile=profiles.get(vehicle.uav),
             offset=vehicle.offset,
+            datum=vehicle.datum,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
             attitude_code=vehicle.attitude_code,
             hearers=tuple(graph.receivers(vehicle.uav)),
@@ -208,7 +210,7 @@ def resolve(scenario: Scenario) -> Mission:
         wire=wire,
         graph=graph,
         obstacles=obstacles,
-        vehicles=tuple(replace(vehicle, obstacles=obstacles) for vehicle in vehicles),
+        vehicles=tuple(vehicles),
         autopilots=autopilots,
         claims=tuple(claim for claim in plan.claims if scenario.case in claim.expected),
         warnings=tuple(findings.warned),

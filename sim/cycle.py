@@ -166,12 +166,14 @@ def measure(fleet, i, tick, seed, true, out):
 def sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
     """Truth of vehicle ``i``, its state as the autopilot is told, and the command in force as fractions of travel.
 
-    Written into ``true`` (13,), ``state`` (13,), see ``wire.STATE``, and ``controls`` (4,); ``seen`` (13,) is room.
+    Written into ``true`` (13,), ``state`` (13,), see ``wire.STATE``, its altitude from the datum on, and ``controls``
+    (4,); ``seen`` (13,) is room.
     """
     actuate(fleet, i, now_us / 1e6)
     truth(fleet, i, now_us / 1e6, true)
     watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[X], true[Z])
     measure(fleet, i, tick, seed, true, seen)
+    seen[Z] -= fleet.datum[i]
     encode_state(seen, state)
     navigate(fleet, i, now_us / 1e6, state)
     encode_command(fleet.command[i], fleet.travel[i], controls)

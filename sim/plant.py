@@ -220,6 +220,8 @@ class Fleet(NamedTuple):
     """(k, 4): see `Guards`."""
     airframe: NDArray[np.float64]
     """(k, m): the plant's ``Parameters``."""
+    datum: NDArray[np.float64]
+    """(k,): altitude from which that in the state's message counts, m: a float32 is fine near its zero alone."""
     offset: NDArray[np.float64]
     """(k,): lateral position y of a plant that flies in a vertical plane, m."""
     target: NDArray[np.float64]

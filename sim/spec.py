@@ -70,6 +70,8 @@ class VehicleSpec:
     target: tuple[float, ...] = (0.0,) * 7
     """A `reference_point`'s first target: stamp s, x, y, z, vx, vy, vz."""
     navigation_faults: tuple[NavigationFault, ...] = ()
+    datum: float = 0.0
+    """Altitude from which that in the state's message counts, m."""
     obstacles: tuple[Obstacle, ...] = ()
     """The same for all vehicles."""
 
@@ -135,6 +137,7 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         disturbances=_padded([spec.disturbances for spec in specs], len(Disturbance._fields)),
         guards=np.array([spec.guards for spec in specs], np.float64),
         airframe=np.array([spec.airframe for spec in specs], np.float64),
+        datum=np.array([spec.datum for spec in specs], np.float64),
         offset=np.array([spec.offset for spec in specs], np.float64),
         target=np.array([spec.target for spec in specs], np.float64),
         point=np.array([spec.kind == "reference_point" for spec in specs], np.int64),

@@ -115,6 +115,12 @@ class HomeFields(Strict):
     latitude: float = Field(47.3977, ge=-85.0, le=85.0, description="deg")
     longitude: float = Field(8.5456, ge=-180.0, le=180.0, description="deg")
     altitude: float = Field(0.0, ge=-500.0, le=9000.0, description="m above mean sea level at z = 0")
+    datum: float = Field(
+        0.0,
+        ge=-500.0,
+        le=20_000.0,
+        description="m, altitude z from which the float32 of LOCAL_POSITION_NED counts between vehicle and autopilot",
+    )
 
 
 class NoiseFields(Strict):

@@ -16,6 +16,7 @@ from tests.sitl.conftest import Flight, same_flight
 EIGHTY = ["rates.control_rate=80", "rates.plant_step=0.0005", "record_rate=80"]
 FOUR_HUNDRED = ["rates.control_rate=400", "rates.plant_step=0.0005"]
 MOVING_AIR = [
+    "home.datum=1000.0",
     "turbulence={sigma=[0.5, 0.5, 0.5], length=[300.0, 300.0, 100.0]}",
     "gusts=[{at=3.0, until=6.0, up=1.0, length=30.0}]",
     "disturbances=[{at=2.0, until=8.0, d2=0.05, frequency=4.0}]",
