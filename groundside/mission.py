@@ -51,7 +51,8 @@ from ftcc.sim import plants
 from ftcc.sim.airframe import scaled
 from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Guards
-from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
+from ftcc.sim.spec import CALM, NO_AUTOTHROTTLE, VehicleSpec
+from ftcc.sim.wind import NO_TURBULENCE
 
 __all__ = ["Mission", "resolve"]
 
@@ -96,7 +97,11 @@ class Mission:
         """The same mission with other random numbers: noise, links, gusts and turbulence."""
         toml = tomli_w.dumps({**tomllib.loads(self.toml), "seed": seed})
         vehicles = tuple(
-            replace(spec, gust=spec.gust._replace(seed=seed), turbulence=spec.turbulence._replace(seed=seed))
+            replace(
+                spec,
+                gust=spec.gust if spec.gust == CALM else spec.gust._replace(seed=seed),
+                turbulence=spec.turbulence if spec.turbulence == NO_TURBULENCE else spec.turbulence._replace(seed=seed),
+            )
             for spec in self.vehicles
         )
         return replace(self, timing=self.timing._replace(seed=seed), vehicles=vehicles, toml=toml)
