@@ -204,6 +204,17 @@ class Scheme:
         return (*states.values(), *(outputs[name] for name in self._shown))
 
     @property
+    def tracking(self) -> tuple[Quantity, ...]:
+        """``TRACKING``: what the law shall make small, as expressions over recorded columns.
+
+        ``bound`` is the size (or the signal) up to which one counts as small. Without it: the signals that are called a
+        tracking error, by their own bounds.
+        """
+        if hasattr(self.module, "TRACKING"):
+            return self.module.TRACKING  # type: ignore[no-any-return]
+        return tuple(signal for signal in self.signals if "tracking error" in signal.meaning)
+
+    @property
     def forms(self) -> dict[str, dict[str, float]]:
         return self._declared("FORMS")  # type: ignore[no-any-return]
 

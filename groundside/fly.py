@@ -20,7 +20,9 @@ from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.pace import Setup, usable_cores
 from ftcc.groundside.pacing import Pacing
 from ftcc.groundside.registry import Card, Control, Entry
+from ftcc.groundside.run import NothingRecordedError, Run
 from ftcc.groundside.snapshot import Event, Pace
+from ftcc.groundside.verdict import FILE, judge
 from ftcc.link.ground import LISTENERS, Address
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
@@ -94,8 +96,8 @@ class _Flight:
     def scheduled_events(self) -> None:
         """Note the scenario's own events as their time comes."""
         while self.next_event < len(self.mission.events) and self.mission.events[self.next_event][0] <= self.station.t:
-            t, uav, text = self.mission.events[self.next_event]
-            self.note(Event(t, "warning", text, uav))
+            t, uav, severity, text = self.mission.events[self.next_event]
+            self.note(Event(t, severity, text, uav))
             self.next_event += 1
 
     def watch_pace(self) -> None:
@@ -206,6 +208,7 @@ def fly(
             swarm.stop()
             _loop(flight, lambda: swarm.over, None, 5.0, _unseen)
             swarm.release()
+            _conclude(flight)
             station.close()
             if control:
                 control.close()
@@ -256,6 +259,24 @@ def _loop(
         if control:
             control.serve()
         flight.refresh(progress)
+
+
+def _conclude(flight: _Flight) -> None:
+    """Say how the flight went, in its log, its folder and the dashboard, where anything was recorded."""
+    run = Run(flight.swarm.folder)
+    try:
+        verdict = judge(run, flight.mission, run.lost)
+    except NothingRecordedError:
+        return
+    flight.swarm.outcome.verdict = verdict
+    (run.path / FILE).write_text(verdict.dumps(), encoding="utf-8")
+    flight.log.write(run.end, verdict.text, severity=verdict.severity)
+    flight.station.note(Event(run.end, verdict.severity, verdict.text))
+    snapshot = flight.station.snapshot()
+    if flight.feed is not None:
+        flight.feed.offer(snapshot)
+    if flight.dashboard is not None:
+        flight.dashboard.log(snapshot)
 
 
 def _unseen(_t: float, _pace: Pace) -> None:

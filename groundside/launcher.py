@@ -26,9 +26,11 @@ from ftcc.groundside.snapshot import Event
 from ftcc.link.gate import Ended, Go, Gone, Held, Lost, Ready, Release, Said, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
+from ftcc.link.recording import AIRCRAFT_LOST
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
+    from ftcc.groundside.verdict import Verdict
 
 __all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
 
@@ -86,6 +88,8 @@ class Outcome:
     """The last tick of the one that flew longest."""
     stopped: bool = False
     """Ended before its time, on request."""
+    verdict: Verdict | None = None
+    """None where nothing was recorded."""
 
     @property
     def ok(self) -> bool:
@@ -270,7 +274,7 @@ class Swarm:
                 self.flow.held(child.name, tick)
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
-                self.on_event(Event(at_us / 1e6, "error", f"aircraft lost: {reason}", uav))
+                self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
             case Said(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 

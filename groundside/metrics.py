@@ -246,6 +246,8 @@ def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> An
 
 def _at(t: Array, times: Array, values: Array) -> Array:
     """``values`` of ``times`` at the times ``t``; nan where there is none."""
+    if np.array_equal(t, times):
+        return values
     found = np.full(len(t), np.nan)
     if len(times):
         place = np.minimum(np.searchsorted(times, t - _CLOSE), len(times) - 1)

@@ -39,7 +39,7 @@ from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
 from ftcc.groundside.scenario import Scenario, load_airframe
 from ftcc.groundside.schema import AirframeSheet, Claim, Damping, Lag, Plan, PointMassSheet, RateLimits
-from ftcc.groundside.table import LEADING
+from ftcc.groundside.table import leading
 from ftcc.groundside.trims import check_starts, check_trims, level_trim
 from ftcc.groundside.wind import check_wind, discrete_gusts, gust, mean_wind, turbulence, wind_texts
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
@@ -85,8 +85,9 @@ class Mission:
     """The merged scenario as flown, with seed and versions: flies the same flight again."""
     home: tuple[float, float, float]
     """Latitude, longitude (deg) and altitude (m) of the origin of the local frame."""
-    events: tuple[tuple[float, int | None, str], ...]
-    """What is planned to happen: time s, UAV (None: everybody), text."""
+    events: tuple[tuple[float, int | None, str, str], ...]
+    """What is planned to happen: time s, UAV (None: everybody), severity, text: a command is "info", a failure or a
+    disturbance a "warning"."""
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -170,7 +171,8 @@ def resolve(scenario: Scenario) -> Mission:
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, graph, channel, findings.refuse)
     check_delays(plan, timing, findings)
-    names = (*LEADING, *(["clearance"] if obstacles else []), *(quantity.name for quantity in scheme.signals))
+    clearance = ["clearance"] if obstacles else []
+    names = (*leading(plant.ACTUATORS), *clearance, *(quantity.name for quantity in scheme.signals))
     findings.refused += check_claims(plan.claims, graph, names)
     findings.stop_if_refused()
 
@@ -376,8 +378,9 @@ def _reference_point(
     )
 
 
-def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str], ...]:
+def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, str, str], ...]:
     events = fault_texts(plan)
+    commands: list[tuple[float, int | None, str]] = []
     units = dict(plant.DISTURBANCES)
     for disturbance in plan.disturbances:
         values = disturbance.values
@@ -393,16 +396,18 @@ def _planned(plan: Plan, plant: ModuleType) -> tuple[tuple[float, int | None, st
             if command.at is not None:
                 asked = [f"{command.altitude:g} m"] if command.altitude is not None else []
                 asked += [f"{command.speed:g} m/s"] if command.speed is not None else []
-                events.append((command.at, uav, f"leader commanded to {', '.join(asked)}"))
+                commands.append((command.at, uav, f"leader commanded to {', '.join(asked)}"))
             if command.until is not None:
-                events.append((command.until, uav, "leader commanded as before"))
+                commands.append((command.until, uav, "leader commanded as before"))
         if leader.cosine is not None:
-            events.append((leader.cosine.at, uav, "leader begins its cosine in altitude"))
-    events += reference_texts(plan)
+            commands.append((leader.cosine.at, uav, "leader begins its cosine in altitude"))
+    commands += reference_texts(plan)
     events += link_texts(plan.link_events)
     events += wind_texts(plan)
+    all_of_them = [(t, uav, "info", text) for t, uav, text in commands]
+    all_of_them += [(t, uav, "warning", text) for t, uav, text in events]
     ends = plan.duration + 1e-9
-    return tuple(sorted((event for event in events if event[0] <= ends), key=lambda e: (e[0], e[1] or 0, e[2])))
+    return tuple(sorted((one for one in all_of_them if one[0] <= ends), key=lambda e: (e[0], e[1] or 0, e[3])))
 
 
 _VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "eclipse-zenoh")

@@ -91,7 +91,8 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
     links = _Links(run)
     events = events_of(run)
     told = 0
-    for k in range(math.floor(run.end * rate + _CLOSE) + 1):
+    last = math.floor(run.end * rate + _CLOSE)
+    for k in range(last + 1):
         t = k / rate
         states = {}
         heard = links.at(t)
@@ -105,7 +106,8 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
             }
             states[uav] = UavState(t=float(own[row]), links=heard.get(uav, {}), **values)
         happened = []
-        while told < len(events) and events[told].t <= t + _CLOSE:
+        # What was logged after the last picture belongs to it.
+        while told < len(events) and (k == last or events[told].t <= t + _CLOSE):
             happened.append(events[told])
             told += 1
         yield Snapshot(t, states, tuple(happened))

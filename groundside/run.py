@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.table import write_table
-from ftcc.link.recording import LINK_COLUMNS, Column, arrow_schema, read_events, read_part
+from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
     from ftcc.groundside.scenario import Scenario
+    from ftcc.groundside.verdict import Verdict
 
 __all__ = ["NothingRecordedError", "Run", "RunError", "new_folder"]
 
@@ -106,13 +107,21 @@ class Run:
         return read_events(self.path / "events.jsonl")
 
     @property
-    def lost(self) -> dict[int, str]:
-        """UAVs that did not end the flight, and what the log says of them."""
-        found: dict[int, str] = {}
+    def lost(self) -> dict[int, tuple[float, str]]:
+        """UAVs that did not end the flight: when (s), and what the log says of them."""
+        found: dict[int, tuple[float, str]] = {}
         for event in self.events:
             if event["severity"] == "error" and event["uav"] is not None:
-                found.setdefault(int(event["uav"]), str(event["text"]))
+                why = str(event["text"]).removeprefix(AIRCRAFT_LOST)
+                found.setdefault(int(event["uav"]), (float(event["t"]), why))
         return found
+
+    @functools.cached_property
+    def verdict(self) -> Verdict:
+        """How the flight went, from the recording."""
+        from ftcc.groundside.verdict import judge
+
+        return judge(self, self.mission, self.lost)
 
     @property
     def end(self) -> float:

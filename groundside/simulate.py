@@ -19,11 +19,12 @@ from ftcc.groundside.errors import UserError
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run
 from ftcc.groundside.table import write_table
-from ftcc.link.actuators import in_slots
+from ftcc.groundside.verdict import FILE, Verdict, judge
+from ftcc.link.actuators import SLOT
 from ftcc.link.channel import LINK_REPORT
 from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.happenings import drained
-from ftcc.link.recording import LINK_COLUMNS, EventLog
+from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
 from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import conditions_of, cycle_of, find
@@ -81,9 +82,9 @@ class Flight:
     @property
     def _places(self) -> dict[str, tuple[NDArray[np.float64], int]]:
         places = {name: (self.truth, n) for n, name in enumerate(TRUTH)}
-        actuators = in_slots(find(self.mission.plant).ACTUATORS)
-        places |= {f"{name}_command": (self.command, n) for n, name in enumerate(actuators)}
-        places |= {name: (self.acting, n) for n, name in enumerate(actuators)}
+        actuators = find(self.mission.plant).ACTUATORS
+        places |= {f"{name}_command": (self.command, SLOT[name]) for name in actuators}
+        places |= {name: (self.acting, SLOT[name]) for name in actuators}
         places |= {name: (self.conditions, n) for n, (name, _) in enumerate(conditions_of(self.mission.plant))}
         if self.mission.obstacles:
             places["clearance"] = (self.clearance, 0)
@@ -96,6 +97,11 @@ class Flight:
         x, z = self.truth[:, :, TRUTH.index("x")], self.truth[:, :, TRUTH.index("z")]
         heights = [clearance(zones, *place) for place in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)]
         return np.array(heights).reshape(*x.shape, 1)
+
+    @functools.cached_property
+    def verdict(self) -> Verdict:
+        """How it went."""
+        return judge(self, self.mission, self.lost)
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
         """A column of one UAV in order of time, as far as it flew."""
@@ -249,19 +255,21 @@ def record(flight: Flight, folder: Path) -> Run:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
     events = EventLog(folder / "events.jsonl")
-    for t, uav, text in mission.events:
+    for t, uav, severity, text in mission.events:
         if len(flight.t) and t <= flight.t[-1]:
-            events.write(t, text, uav, "warning")
+            events.write(t, text, uav, severity)
     if refusal := tick_of(mission.scheme.name).REFUSAL:
         events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():
-        events.write(t, f"UAV {uav} lost: {why}", uav, "error")
+        events.write(t, f"{AIRCRAFT_LOST}{why}", uav, "error")
     for t, uav, severity, text in flight.events:
         events.write(t, text, uav, severity)
     last = float(flight.t[-1]) if len(flight.t) else 0.0
     if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
         events.write(last, "interrupted", severity="warning")
+    events.write(last, flight.verdict.text, severity=flight.verdict.severity)
     events.close()
+    (folder / FILE).write_text(flight.verdict.dumps(), encoding="utf-8")
     columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
     write_table(folder / "signals.parquet", columns, flight.table())
     write_table(folder / "links.parquet", LINK_COLUMNS, flight.link_table())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,18 @@ from numpy.typing import NDArray
 from ftcc.link.recording import Column, arrow_schema
 from ftcc.sim.plant import TRUTH
 
-__all__ = ["LEADING", "write_table"]
+__all__ = ["LEADING", "leading", "write_table"]
 
 _SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
 LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
-"""The first columns of ``signals.parquet``; the scheme's SIGNALS follow."""
+"""The first columns of ``signals.parquet``, of all plants; the scheme's SIGNALS follow."""
+
+
+def leading(actuators: Collection[str]) -> list[str]:
+    """Those of an aircraft with these actuators."""
+    lacking = {name for name in _SHOWN if name not in actuators}
+    return [name for name in LEADING if name.removesuffix("_command") not in lacking]
 
 
 def _ordered(columns: Sequence[Column]) -> list[Column]:

@@ -16,6 +16,7 @@ __all__ = [
     "SLOT",
     "THRUST",
     "as_sent",
+    "by_slot",
     "decode_command",
     "encode_command",
     "in_slots",
@@ -44,6 +45,11 @@ def in_slots(used: Iterable[str]) -> tuple[str, ...]:
     for name in used:
         names[SLOT[name]] = name
     return tuple(names)
+
+
+def by_slot(used: Iterable[str]) -> tuple[str, ...]:
+    """The actuators ``used`` alone, in the order of their slots."""
+    return tuple(sorted(used, key=SLOT.__getitem__))
 
 
 @compiled

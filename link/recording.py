@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ftcc.link.compiled import compiled
 
 __all__ = [
+    "AIRCRAFT_LOST",
     "LINK_COLUMNS",
     "ROWS",
     "SCHEMA_VERSION",
@@ -43,6 +44,9 @@ _SPARE = 256
 """Rows beyond them, in which a tick surely finds room: one for each UAV that may be heard."""
 _FLUSH = 0.9
 """Wall time after which rows are written though there is room for more, s."""
+
+AIRCRAFT_LOST = "aircraft lost: "
+"""How an event begins that tells why a UAV was lost."""
 
 _INTEGERS = ("uav", "sender")
 
@@ -159,10 +163,14 @@ class Recorder:
     ----------
     paths : the file of each UAV; None: nothing is recorded of it.
     columns : of all of them.
+    places : where each column stands in a row, ascending, the last one at its end; by default one after the other.
     """
 
-    def __init__(self, paths: Sequence[Path | None], columns: Sequence[Column]) -> None:
-        self.rows = new_rows(len(paths), len(columns))
+    def __init__(
+        self, paths: Sequence[Path | None], columns: Sequence[Column], places: Sequence[int] | None = None
+    ) -> None:
+        self._places = list(range(len(columns)) if places is None else places)
+        self.rows = new_rows(len(paths), self._places[-1] + 1)
         self._parts = {i: PartWriter(path, columns) for i, path in enumerate(paths) if path is not None}
         self._written = time.monotonic()
 
@@ -170,7 +178,7 @@ class Recorder:
         """Write all rows that have been filled."""
         self._written = time.monotonic()
         for i, part in self._parts.items():
-            part.write(self.rows.values[i, : self.rows.filled[i]])
+            part.write(self.rows.values[i, : self.rows.filled[i]][:, self._places])
         self.rows.filled[:] = 0
 
     def write_if_due(self) -> None:

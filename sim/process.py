@@ -13,7 +13,7 @@ from types import ModuleType
 
 import numpy as np
 
-from ftcc.link.actuators import in_slots, unit_of
+from ftcc.link.actuators import ACTUATORS, SLOT, by_slot, in_slots, unit_of
 from ftcc.link.compiled import entry_of
 from ftcc.link.failures import Failure, failure_answer, read_failure
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
@@ -31,7 +31,7 @@ from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS
 from ftcc.sim.plants import conditions_of, find, flight_of
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["Vehicles", "columns", "load_compiled", "run", "truth_array"]
+__all__ = ["Vehicles", "columns", "load_compiled", "places", "run", "truth_array"]
 
 _ATTENTION = 0.05
 """Wall time between two looks at the launcher and the clock, s."""
@@ -42,7 +42,7 @@ _CLEARANCE = Column("clearance", "m", "height above the obstacle below, or above
 
 def columns(plant: str, obstacles: bool = False) -> tuple[Column, ...]:
     """Columns of a vehicle's part of the recording; clearance where there are obstacles."""
-    actuators = in_slots(find(plant).ACTUATORS)
+    actuators = by_slot(find(plant).ACTUATORS)
     return (
         Column("t", "s", "simulated time"),
         Column("uav", "-", "id"),
@@ -52,6 +52,15 @@ def columns(plant: str, obstacles: bool = False) -> tuple[Column, ...]:
         *(Column(name, unit, "true value") for name, unit in conditions_of(plant)),
         *([_CLEARANCE] if obstacles else []),
     )
+
+
+def places(plant: str, obstacles: bool = False) -> tuple[int, ...]:
+    """Where the numbers of `columns` stand in a row as it is filled, which has all slots of the actuators."""
+    slots = [SLOT[name] for name in by_slot(find(plant).ACTUATORS)]
+    commands = 2 + len(TRUTH)
+    acting, conditions = commands + len(ACTUATORS), commands + 2 * len(ACTUATORS)
+    rest = range(conditions, conditions + len(conditions_of(plant)) + obstacles)
+    return (*range(commands), *(commands + slot for slot in slots), *(acting + slot for slot in slots), *rest)
 
 
 def truth_array(plant: str) -> tuple[str, ...]:
@@ -95,9 +104,11 @@ class Vehicles:
             Endpoint(setting.system(spec.uav), SIMULATOR, port.truth, (LOOPBACK, setting.station))
             for spec, port in zip(specs, ports, strict=True)
         ]
+        plant, obstacles = specs[0].plant, bool(specs[0].obstacles)
         self.recorder = Recorder(
             [part_path(setting.folder, spec.uav, "vehicle") for spec in specs],
-            columns(specs[0].plant, bool(specs[0].obstacles)),
+            columns(plant, obstacles),
+            places(plant, obstacles),
         )
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)

@@ -147,6 +147,10 @@ SIGNALS = (
     Q("elevator_wanted", "rad", "elevator command before saturation"),
     Q("thrust_wanted", "N", "thrust command before saturation"),
 )
+TRACKING = (
+    Q("z - z_d", "m", "altitude off its place between the leaders", bound=2.0),
+    Q("S5", "m/s", "speed tracking error", bound=0.5),
+)
 GRAPH = Assumption.UNDIRECTED_LEADERS_REACH_ALL
 COMMANDS = ("thrust", "elevator")
 PLANT = "longitudinal"

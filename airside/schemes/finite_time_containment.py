@@ -209,6 +209,10 @@ SIGNALS = (
     Q("thrust_wanted", "N", "thrust command before saturation"),
     Q("elevator_wanted", "rad", "elevator command before saturation"),
 )
+TRACKING = (
+    Q("x - x_d", "m", "position off its place between the leaders", bound=5.0),
+    Q("z - z_d", "m", "altitude off its place between the leaders", bound=2.0),
+)
 GRAPH = Assumption.UNDIRECTED_LEADERS_REACH_ALL
 COMMANDS = ("thrust", "elevator")
 PLANT = "longitudinal"

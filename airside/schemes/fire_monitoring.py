@@ -169,6 +169,11 @@ SIGNALS = (
     Q("fire_north", "m", "centre of the formation, north"),
     Q("fire_east", "m", "centre of the formation, east"),
 )
+TRACKING = (
+    Q("x - x_ref", "m", "off the reference, north", bound=5.0),
+    Q("y - y_ref", "m", "off the reference, east", bound=5.0),
+    Q("z - z_ref", "m", "off the reference, altitude", bound=2.0),
+)
 GRAPH = Assumption.CONNECTED_UNDIRECTED
 COMMANDS = ("thrust", "load_factor", "bank")
 PLANT = "position"

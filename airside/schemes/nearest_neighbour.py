@@ -161,6 +161,10 @@ SIGNALS = (
     Q("thrust_wanted", "N", "thrust before saturation"),
     Q("elevator_wanted", "rad", "elevator before saturation"),
 )
+TRACKING = (
+    Q("z - z_d", "m", "altitude off the leader's", bound=2.0),
+    Q("S1", "m/s", "speed tracking error", bound=0.5),
+)
 BRIEFED = True
 """The first tick already compares the own motion with the neighbours'."""
 SWEEPS = 200

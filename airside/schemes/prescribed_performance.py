@@ -195,6 +195,7 @@ SIGNALS = (
     Q("unexplained", "rad/s^2", "pitch acceleration that the control does not explain"),
     Q("elevator_wanted", "rad", "elevator command before saturation"),
 )
+TRACKING = (Q("z - z_d", "m", "altitude off the leader's", bound=2.0),)
 GRAPH = Assumption.ONE_LEADER_UNDIRECTED
 COMMANDS = ("thrust", "elevator")
 PLANT = "longitudinal"

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ftcc.groundside.claims import Result
     from ftcc.groundside.mission import Mission
     from ftcc.groundside.scenario import Scenario
+    from ftcc.groundside.verdict import Verdict
 
 __all__ = [
     "Duration",
@@ -26,8 +27,11 @@ __all__ = [
     "ScenarioName",
     "Seed",
     "Settings",
+    "Strict",
     "Variants",
+    "end_by",
     "fail",
+    "judged",
     "load_mission",
     "load_scenario",
     "new_run_folder",
@@ -51,6 +55,10 @@ Settings = Annotated[
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a value of the scenario; repeatable."),
 ]
 
+Strict = Annotated[bool, typer.Option("--strict", help="Exit code 3 where the verdict is 'failed'.")]
+
+_FAILED = 3
+"""Exit code of ``--strict``."""
 _GREATEST_SPEED = 1000.0
 _PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables must not be folded into a file."""
@@ -159,6 +167,23 @@ def show_claims(folder: Path) -> None:
         return
     if results:
         report.show_claims(terminal(), results)
+
+
+def judged(verdict: Verdict, strict: bool) -> None:
+    """Show how a flight went; if ``strict``, end by it."""
+    from ftcc.groundside import report
+
+    report.show_verdict(terminal(), verdict)
+    if strict:
+        end_by(verdict)
+
+
+def end_by(verdict: Verdict) -> None:
+    """End with an exit code of its own if the flight failed."""
+    from ftcc.groundside.verdict import FAILED
+
+    if verdict.word == FAILED:
+        raise typer.Exit(_FAILED)
 
 
 def show_summary(folder: Path, results: list[Result]) -> None:

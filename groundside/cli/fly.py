@@ -19,8 +19,10 @@ from ftcc.groundside.cli.common import (
     Out,
     Seed,
     Settings,
+    Strict,
     Variants,
     fail,
+    judged,
     load_mission,
     new_run_folder,
     show_claims,
@@ -113,6 +115,7 @@ def fly(
     id_offset: Annotated[
         int, typer.Option(help="Add this to the UAVs' ids in MAVLink, so that ground stations tell two swarms apart.")
     ] = 0,
+    strict: Strict = False,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
     from ftcc.groundside.fly import Clock, Viewer
@@ -200,8 +203,9 @@ def fly(
     if not outcome.ok:
         for name in outcome.died:
             console.print(f"[bold red]process {name} died[/]; see {folder / 'logs'}", soft_wrap=True)
-        for uav, reason in outcome.lost.items():
-            console.print(f"[bold red]UAV {uav} lost[/]: {reason}")
+    if outcome.verdict is not None:
+        judged(outcome.verdict, strict)
+    if not outcome.ok:
         raise typer.Exit(_FLIGHT_FAILED)
 
 

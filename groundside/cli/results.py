@@ -7,19 +7,20 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside.cli.common import terminal, warn
+from ftcc.groundside.cli.common import Strict, end_by, terminal, warn
 
 __all__ = ["compare", "report"]
 
 
 def report(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
-    json: Annotated[bool, typer.Option("--json", help="Print the claims as JSON.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print verdict and claims as JSON.")] = False,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
     mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
     page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
+    strict: Strict = False,
 ) -> None:
-    """Show what a run recorded and whether its scenario's claims hold; exit code 1 if one fails."""
+    """Show what a run recorded, its verdict and whether its scenario's claims hold; exit code 1 if one fails."""
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import as_json, claims_of, show
     from ftcc.groundside.report.report import write_report
@@ -49,6 +50,8 @@ def report(
             written.print(f"wrote {file}", highlight=False, soft_wrap=True)
     if page and not json:
         written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+    if strict:
+        end_by(recorded.verdict)
     if failed(results):
         raise typer.Exit(1)
 

@@ -14,7 +14,9 @@ from ftcc.groundside.cli.common import (
     ScenarioName,
     Seed,
     Settings,
+    Strict,
     Variants,
+    judged,
     load_mission,
     load_scenario,
     new_run_folder,
@@ -95,6 +97,7 @@ def simulate(
     seed: Seed = None,
     out: Out = None,
     settings: Settings = None,
+    strict: Strict = False,
 ) -> None:
     """Fly a scenario in one process, as fast as this machine can, and record it."""
     from rich.progress import BarColumn, Progress, TextColumn
@@ -121,14 +124,13 @@ def simulate(
             flight = fly(mission, lambda t: progress.update(task, completed=t), ready)
         finally:
             compiling.cancel()
-        run = record(flight, folder)
+        record(flight, folder)
     # What was recorded is in memory still.
     show_summary(folder, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration))
-    for uav, text in run.lost.items():
-        warn(f"UAV {uav}: {text}")
+    judged(flight.verdict, strict)
     end = float(flight.t[-1]) if len(flight.t) else 0.0
     interrupted = end < mission.timing.duration - mission.timing.period * mission.timing.record_every
-    if run.lost or interrupted:
+    if flight.lost or interrupted:
         raise typer.Exit(1)
 
 

@@ -1,4 +1,4 @@
-"""The report as one page: figures, claims, what the monograph shows, events, links, versions. Needs no network."""
+"""The report as one page: verdict, claims, figures, what the monograph shows, events, links. Needs no network."""
 
 from __future__ import annotations
 
@@ -9,12 +9,25 @@ from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.claims import Result
 from ftcc.groundside.report.readings import Compared
-from ftcc.groundside.report.terminal import ids, number, summary
+from ftcc.groundside.report.terminal import number, summary
+from ftcc.groundside.text import ids
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict, size
 
 if TYPE_CHECKING:
     from ftcc.groundside.report.drawing import Drawn
 
-__all__ = ["Cell", "Head", "Page", "Section", "claims_section", "compared_section", "events_section", "plural", "write"]
+__all__ = [
+    "Cell",
+    "Head",
+    "Page",
+    "Section",
+    "claims_section",
+    "compared_section",
+    "events_section",
+    "plural",
+    "verdict_section",
+    "write",
+]
 
 
 @dataclass(frozen=True)
@@ -64,7 +77,8 @@ class Page:
         """Anchors and titles."""
         found = [(section.anchor, section.title) for section in self.sections]
         if self.figures:
-            found.insert(1 if found and found[0][0] == "claims" else 0, ("figures", "Figures"))
+            before = sum(anchor in ("verdict", "claims") for anchor, _ in found)
+            found.insert(before, ("figures", "Figures"))
         if self.scenario:
             found.append(("scenario", "Scenario as flown"))
         return found
@@ -81,6 +95,31 @@ def write(page: Page, path: Path) -> Path:
     html = environment.get_template("page.html.jinja").render(**vars(page), contents=page.contents)
     path.write_text(html, encoding="utf-8")
     return path
+
+
+def verdict_section(verdict: Verdict) -> Section:
+    """How the flight went: the word and what led to it, then all that was found."""
+    mark = {AS_IT_SHOULD: "holds", REMARKS: "warning", FAILED: "fails"}[verdict.word]
+    rows = [[Cell("verdict"), Cell(""), Cell(verdict.word, mark), Cell("")]]
+    rows += [[Cell(""), Cell(""), Cell(text, "error"), Cell("")] for text in verdict.failures]
+    rows += [[Cell(""), Cell(""), Cell(text, "warning"), Cell("")] for text in verdict.remarks]
+    for error in verdict.tracking:
+        largest = f"{size(error.largest, error.unit)} at {error.at:.1f} s"
+        allowed = "" if error.allowed is None else f" ({size(error.allowed, error.unit)} allowed)"
+        end = f"in the end {size(error.end, error.unit)}, UAV {error.end_uav}{allowed}"
+        rows.append([Cell(f"{error.meaning}, {error.name}"), Cell(str(error.uav)), Cell(largest), Cell(end)])
+    for left in verdict.outside:
+        until = "in the end" if left.at_end else f"until {left.until:.1f} s"
+        rows.append([Cell(f"{left.name} left"), Cell(str(left.uav)), Cell(f"{left.seconds:.3g} s"), Cell(until)])
+    for one in verdict.saturation:
+        what = f"{one.actuator.replace('_', ' ')} at its limits"
+        rows.append([Cell(what), Cell(str(one.uav)), Cell(f"{100.0 * one.share:.2g} % of the time"), Cell("")])
+    for cycle in verdict.limit_cycles:
+        about = f"+-{size(cycle.amplitude, cycle.unit)}"
+        what = f"limit cycle of {cycle.signal.replace('_', ' ')}"
+        rows.append([Cell(what), Cell(str(cycle.uav)), Cell(f"{cycle.frequency:.3g} rad/s"), Cell(about)])
+    heads = [Head("what"), Head("UAV"), Head("found"), Head("")]
+    return Section("verdict", "Verdict", heads=heads, rows=rows)
 
 
 _VERDICTS = {True: Cell("holds", "holds"), False: Cell("fails", "fails"), None: Cell("not flown", "open")}

@@ -20,6 +20,7 @@ from ftcc.groundside.report.page import (
     compared_section,
     events_section,
     plural,
+    verdict_section,
     write,
 )
 from ftcc.groundside.report.readings import compare
@@ -66,7 +67,7 @@ def write_report(run: Run, folder: Path | None = None) -> Path:
     page = Page(
         title=mission.title,
         subtitle=_subtitle(run, mission),
-        facts=_facts(run, mission, end, results),
+        facts=[*([("verdict", run.verdict.word)] if signals is run else []), *_facts(run, mission, end, results)],
         notes=notes,
         figures=draw_figures(sheet, [flown], folder),
         figures_note=_figures_note(sheet, mission),
@@ -74,6 +75,8 @@ def write_report(run: Run, folder: Path | None = None) -> Path:
     )
     timeline = draw_timeline(events, mission, end)
     svg = save(timeline, "timeline", "Events by time", "", folder).svg if timeline is not None else ""
+    if signals is run:
+        page.sections.append(verdict_section(run.verdict))
     page.sections.append(claims_section(results, mission.case))
     if sheet.source and mission.name in sheet.scenarios:
         compared = compare(sheet, flown)
@@ -154,7 +157,7 @@ def _has_processes(run: Run) -> bool:
 
 def _unfinished(run: Run, mission: Mission, end: float) -> list[str]:
     """What a reader must know before trusting the numbers."""
-    notes = [f"UAV {uav}: {text}" for uav, text in run.lost.items()]
+    notes = [f"UAV {uav} lost at {t:.2f} s: {why}" for uav, (t, why) in run.lost.items()]
     over = any("flight over" in str(event["text"]) for event in run.events)
     step = mission.timing.record_every * mission.timing.period
     if end < mission.timing.duration - 1.5 * step:

@@ -1,4 +1,4 @@
-"""What a run showed, on the terminal: its claims and events; and its claims as JSON."""
+"""What a run showed, on the terminal: its verdict, claims and events; verdict and claims as JSON."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.run import Run
+from ftcc.groundside.text import ids
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["as_json", "claims_of", "claims_table", "ids", "number", "show", "show_claims", "summary"]
+__all__ = ["as_json", "claims_of", "claims_table", "number", "show", "show_claims", "show_verdict", "summary"]
 
+_COLOURS = {AS_IT_SHOULD: "bold green", REMARKS: "bold yellow", FAILED: "bold red"}
 _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not flown[/]"}
 
 
@@ -24,13 +27,26 @@ def claims_of(run: Run) -> list[Result]:
     return evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
+def show_verdict(console: Console, verdict: Verdict) -> None:
+    """Print how a flight went: the word, what led to it, and the largest tracking errors."""
+    from rich.markup import escape
+
+    lines = [f"[{_COLOURS[verdict.word]}]verdict: {verdict.word}[/]"]
+    lines += [f"  [bold red]{escape(text)}[/]" for text in verdict.failures]
+    lines += [f"  [yellow]{escape(text)}[/]" for text in verdict.remarks]
+    lines += [f"  [dim]largest {escape(text)}[/]" for text in verdict.largest]
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
 def as_json(run: Run, results: list[Result]) -> str:
-    """The claims for programs: ``value`` and ``ok`` are null where the flight did not cover the window."""
+    """Verdict and claims for programs: ``value`` and ``ok`` are null where the flight did not cover the window."""
     mission = run.mission
     document = {
         "scenario": mission.name,
         "form": mission.form,
         "variant": ",".join(mission.variants),
+        "verdict": run.verdict.as_json(),
         "claims": [result.as_json() for result in results],
     }
     return json.dumps(document, indent=2, allow_nan=False)
@@ -92,17 +108,6 @@ def claims_table(results: list[Result]) -> Table:
     return table
 
 
-def ids(uavs: tuple[int, ...]) -> str:
-    """Ids in short: 1-6, 8."""
-    runs: list[list[int]] = []
-    for uav in sorted(uavs):
-        if runs and uav == runs[-1][-1] + 1:
-            runs[-1].append(uav)
-        else:
-            runs.append([uav])
-    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
-
-
 def show(console: Console, run: Run, results: list[Result]) -> None:
     """The whole report on the terminal: what was flown, what happened, which claims hold."""
     from rich.markup import escape
@@ -125,3 +130,4 @@ def show(console: Console, run: Run, results: list[Result]) -> None:
         show_claims(console, results)
     else:
         console.print(f"the scenario makes no claims for case {mission.case}")
+    show_verdict(console, run.verdict)

@@ -24,6 +24,7 @@ from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.launcher import no_main_module
 from ftcc.groundside.simulate import PlainPython, fly, record
 from ftcc.groundside.study.plan import Study, Trial
+from ftcc.groundside.verdict import Verdict
 
 __all__ = ["Outcome", "fly_all", "run_folder"]
 
@@ -43,6 +44,8 @@ class Outcome:
     """Wall time of the flight, s."""
     problem: str
     """Why there was no flight, or why it broke off; empty if there was one."""
+    verdict: Verdict | None = None
+    """None if it did not fly."""
 
     @property
     def error(self) -> str:
@@ -243,10 +246,11 @@ def _fly(trial: Trial) -> Outcome:
         if record_in is not None:
             record(flight, run_folder(record_in, trial))
         results = evaluate(flight, mission.claims, mission.case, mission.graph)
+        verdict = flight.verdict
     except _StoppedError:
         raise
     except Exception as error:  # a flight that fails is a row of the table, not the end of the study
         where = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
         return Outcome(trial, (), {}, time.perf_counter() - begun, text)
-    return Outcome(trial, tuple(results), flight.lost, time.perf_counter() - begun, "")
+    return Outcome(trial, tuple(results), flight.lost, time.perf_counter() - begun, "", verdict)

@@ -16,6 +16,7 @@ from ftcc.groundside.claims import Result, Tolerance, by_case, tolerance_of, uav
 from ftcc.groundside.schema import Claim
 from ftcc.groundside.study.flights import Outcome
 from ftcc.groundside.study.plan import Study
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -91,7 +92,8 @@ def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
     """All flights as a ``pyarrow.Table``, a row each.
 
     Columns: ``flight``, the varied keys, ``seed``; for each claim its value under the claim's name, and ``NAME holds``;
-    ``lost`` (ids), ``error`` (text), ``wall`` (s). Null: not flown, or no such number. Units, tolerances and sources
+    ``largest error`` (of the scheme's first tracking error), ``verdict``, ``lost`` (ids), ``error`` (text), ``wall``
+    (s). Null: not flown, or no such number. Units, tolerances and sources
     are in the columns' metadata, the rest in the table's.
     """
     import pyarrow as pa
@@ -116,7 +118,15 @@ def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
             for outcome, combination in zip(outcomes, combinations, strict=True)
         ]
         columns.append((f"{title} holds", pa.bool_(), verdicts, {}))
+    verdicts_of = [outcome.verdict for outcome in outcomes]
+    tracked = mission.scheme.tracking
+    if tracked:
+        notes = {"unit": tracked[0].unit, "meaning": f"largest of all UAVs, abs({tracked[0].name})"}
+        largest = [one.tracking[0].largest if one and one.tracking else None for one in verdicts_of]
+        columns.append(("largest error", pa.float64(), largest, notes))
+    words = [one.word if one else None for one in verdicts_of]
     columns += [
+        ("verdict", pa.string(), words, {"meaning": "how the flight went"}),
         ("lost", pa.list_(pa.int32()), [list(outcome.lost) for outcome in outcomes], {"meaning": "UAVs"}),
         ("error", pa.string(), [outcome.error or None for outcome in outcomes], {}),
         ("wall", pa.float64(), [outcome.wall for outcome in outcomes], {"unit": "s", "meaning": "wall time"}),
@@ -187,6 +197,9 @@ def summary(study: Study, outcomes: Sequence[Outcome]) -> Table:
         shown.add_column(escape(label(study, n) or study.mission.case), justify="right")
     shown.add_row("flights", *(str(len(group)) for group in groups))
     shown.add_row("with lost aircraft", *(str(sum(bool(outcome.lost) for outcome in group)) for group in groups))
+    for word in (AS_IT_SHOULD, REMARKS, FAILED):
+        words = [[outcome.verdict.word for outcome in group if outcome.verdict] for group in groups]
+        shown.add_row(f"verdict: {word}", *(str(those.count(word)) for those in words))
     shown.add_row("not flown", *(str(sum(bool(outcome.problem) for outcome in group)) for group in groups))
     shown.add_section()
     for quantity in quantities(study):

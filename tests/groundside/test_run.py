@@ -22,8 +22,8 @@ from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns as vehicle_columns
 
 TRUTH = ["x", "y", "z", "V", "gamma", "chi", "mu", "alpha", "beta", "theta", "p", "q", "r"]
-COMMANDED = ["thrust_command", "elevator_command", "aileron_command", "rudder_command"]
-ACTING = ["thrust", "elevator", "aileron", "rudder"]
+COMMANDED = ["thrust_command", "elevator_command"]
+ACTING = ["thrust", "elevator"]
 CONDITIONS = [name for name, _ in conditions_of("longitudinal")]
 
 

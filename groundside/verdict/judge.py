@@ -1,0 +1,252 @@
+"""What a recording shows of how the flight went: tracking errors, bounds, saturation, limit cycles, losses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.metrics import Signals, evaluated, names_in
+from ftcc.groundside.verdict.oscillation import is_driven, oscillation
+from ftcc.groundside.verdict.verdict import LimitCycle, Loss, Outside, Saturation, TrackingError, Verdict
+from ftcc.link.actuators import SLOT, unit_of
+from ftcc.sim.plants import conditions_of, find
+
+if TYPE_CHECKING:
+    from ftcc.groundside.mission import Mission
+
+__all__ = ["judge"]
+
+Array = NDArray[np.float64]
+_NEVER: Array = np.empty(0)
+
+END, LEAST_END = 0.05, 2.0
+"""What counts as the end of a flight, for errors and bounds: this share of it, and so many seconds at least."""
+HULL = 1.0
+"""How far outside the leaders' hull a UAV may be, m; counted from when it first was inside."""
+LONG = 0.2
+"""Share of its flight that an actuator may be at its limits without a remark."""
+RIPPLE = 0.02
+"""Share of an actuator's travel up to which it may oscillate."""
+ALLOWED = {"m": 5.0, "m/s": 1.0, "rad": 0.1}
+"""Tracking errors at the end, where the scheme does not say what is small; by unit, others are told and not judged."""
+
+_AT_LIMIT = 1e-6
+"""Of the travel: commands are float32."""
+_NO_LIMIT = 1e6
+"""A travel beyond this is none."""
+_TOGETHER = 2.0
+"""UAVs whose recordings end within so many seconds flew to the end: processes that are stopped stop one by one."""
+_CLOSE = 1e-6
+"""Rounding of times, s."""
+
+_HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
+          "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
+"""Who tracks a place between the leaders shall be between them."""
+
+
+def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
+    """How a flight went.
+
+    Parameters
+    ----------
+    signals : Signals
+        The recording.
+    mission : Mission
+    lost : mapping
+        When (s) and why a UAV was lost, by id.
+    """
+    flight = _Flight(signals, mission)
+    saturation = sorted(_saturation(flight), key=lambda one: -one.share)
+    return Verdict(
+        flown=flight.end if flight.end < mission.timing.duration - flight.row - _CLOSE else mission.timing.duration,
+        planned=mission.timing.duration,
+        tracking=tuple(_tracking(flight)),
+        outside=tuple(_outside(flight)),
+        saturation=tuple(saturation),
+        saturated=tuple(one for one in saturation if one.share > LONG),
+        limit_cycles=tuple(_limit_cycles(flight)),
+        lost=tuple(_losses(flight, lost)),
+    )
+
+
+class _Flight:
+    """A recording with what its mission says of it."""
+
+    def __init__(self, signals: Signals, mission: Mission) -> None:
+        self.signals = signals
+        self.mission = mission
+        self.graph = mission.graph
+        self._values: dict[tuple[str, int], Array] = {}
+        self.row = mission.timing.record_every * mission.timing.period
+        """Time from row to row, s."""
+        self.times = {uav: signals.column("t", uav) for uav in signals.uavs}
+        self.end = max((float(t[-1]) for t in self.times.values() if len(t)), default=0.0)
+        self.closing = self.end - max(END * self.end, LEAST_END) - _CLOSE
+        """When the end begins, s."""
+        self.followers = [uav for uav in self.graph.followers if len(self.times.get(uav, _NEVER))]
+
+    def lasted(self, uav: int) -> bool:
+        """Whether a UAV flew to the end."""
+        t = self.times.get(uav, _NEVER)
+        return bool(len(t)) and t[-1] >= self.end - _TOGETHER
+
+    def of(self, expression: str, uav: int) -> Array:
+        """An expression at all times of a UAV."""
+        if (expression, uav) not in self._values:
+            self._values[expression, uav] = evaluated(expression, self.signals, self.graph, uav)
+        return self._values[expression, uav]
+
+    def has(self, expression: str) -> bool:
+        """Whether the recording can say it: places between leaders need leaders that reach everybody."""
+        names = names_in(expression)
+        places = names & (set(_HULLS) | {name for name, _ in _HULLS.values()})
+        led = bool(self.graph.leaders) and set(self.graph.followers) <= self.graph.reached_from(self.graph.leaders)
+        return names - places <= set(self.signals.names) and (led or not places)
+
+
+def _losses(flight: _Flight, lost: Mapping[int, tuple[float, str]]) -> Iterator[Loss]:
+    for uav in flight.mission.uavs:
+        if uav in lost:
+            yield Loss(uav, *lost[uav])
+        elif flight.end > 0.0 and not flight.lasted(uav):
+            t = flight.times.get(uav, _NEVER)
+            yield Loss(uav, float(t[-1]) if len(t) else 0.0, "its recording ends")
+
+
+def _tracking(flight: _Flight) -> Iterator[TrackingError]:
+    """Every tracking error that the scheme declares."""
+    for error in flight.mission.scheme.tracking:
+        if not flight.has(error.name):
+            continue
+        largest, end = (-1.0, 0, 0.0), (-1.0, 0)
+        too_large = False
+        for uav in flight.followers:
+            t = flight.times[uav]
+            x = np.abs(flight.of(error.name, uav))
+            there = np.flatnonzero(np.isfinite(x))
+            if not len(there):
+                continue
+            worst = there[int(np.argmax(x[there]))]
+            largest = max(largest, (float(x[worst]), uav, float(t[worst])), key=lambda one: one[0])
+            late = there[t[there] >= flight.closing]
+            if flight.lasted(uav) and len(late):
+                end = max(end, (float(x[late].max()), uav), key=lambda one: one[0])
+                allowed = _allowed(flight, error.bound, error.unit, uav)
+                too_large |= allowed is not None and bool((x[late] > np.broadcast_to(allowed, x.shape)[late]).any())
+        if largest[0] < 0.0:
+            continue
+        size = _allowed(flight, error.bound, error.unit, end[1]) if end[1] else None
+        allowed_at_end = None if size is None else float(np.min(size))
+        at_end = end if end[1] else (float("nan"), 0)
+        yield TrackingError(error.name, error.unit, error.meaning, *largest, *at_end, allowed_at_end, too_large)
+
+
+def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) -> Array | float | None:
+    if isinstance(bound, str):
+        return np.abs(flight.of(bound, uav))
+    return bound if bound is not None else ALLOWED.get(unit)
+
+
+def _outside(flight: _Flight) -> Iterator[Outside]:
+    """Bounds of signals, and the leaders' hull, that a UAV left."""
+    for signal in flight.mission.scheme.signals:
+        for uav in flight.followers if signal.bound is not None else ():
+            bound = np.abs(flight.of(str(signal.bound), uav))
+            beyond = np.abs(flight.of(signal.name, uav)) > bound
+            name = f"bound {signal.bound} of {signal.name}"
+            yield from _left(flight, name, signal.meaning, uav, beyond)
+    if len(flight.graph.leaders) < 2:
+        return
+    tracked = frozenset[str]().union(*(names_in(error.name) for error in flight.mission.scheme.tracking))
+    for place, (distance, name) in _HULLS.items():
+        if not flight.has(distance) or (place not in tracked and flight.mission.scheme.plant != "longitudinal"):
+            continue
+        if place == "x_d" and place not in tracked:
+            continue
+        for uav in flight.followers:
+            away = flight.of(distance, uav)
+            inside = away <= HULL
+            entered = np.logical_or.accumulate(inside) | ~inside.any()
+            beyond = entered & (away > HULL)
+            yield from _left(flight, name, f"more than {HULL:g} m outside", uav, beyond)
+
+
+def _left(flight: _Flight, name: str, meaning: str, uav: int, beyond: NDArray[np.bool_]) -> Iterator[Outside]:
+    rows = np.flatnonzero(beyond)
+    if len(rows):
+        until = float(flight.times[uav][rows[-1]])
+        at_end = flight.lasted(uav) and until >= flight.closing
+        yield Outside(name, meaning, uav, len(rows) * flight.row, until, at_end)
+
+
+class _Actuator(NamedTuple):
+    name: str
+    low: float
+    high: float
+
+    @property
+    def travel(self) -> float:
+        return self.high - self.low
+
+
+def _actuators(flight: _Flight, uav: int) -> list[_Actuator]:
+    """The actuators of a UAV that can move."""
+    limits = next(vehicle.limits for vehicle in flight.mission.vehicles if vehicle.uav == uav)
+    found = [_Actuator(name, *limits[SLOT[name]]) for name in find(flight.mission.plant).ACTUATORS]
+    return [one for one in found if 0.0 < one.travel < _NO_LIMIT]
+
+
+def _saturation(flight: _Flight) -> Iterator[Saturation]:
+    for uav in flight.followers:
+        for actuator in _actuators(flight, uav):
+            command = flight.signals.column(f"{actuator.name}_command", uav)
+            close = _AT_LIMIT * actuator.travel
+            share = float(((command <= actuator.low + close) | (command >= actuator.high - close)).mean())
+            if share > 0.0:
+                yield Saturation(actuator.name, uav, share)
+
+
+def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
+    """The worst oscillation of each UAV, in shares of what is allowed."""
+    given: list[float] | None = None
+    for uav in filter(flight.lasted, flight.followers):
+        t = flight.times[uav]
+        worst, size = None, 0.0
+        for name, unit, x, floor in _oscillating(flight, uav):
+            found = oscillation(t, x, floor)
+            if found is None or found.amplitude / floor <= size:
+                continue
+            given = _given(flight) if given is None else given
+            if not is_driven(found.frequency, given):
+                worst, size = LimitCycle(name, unit, uav, *found), found.amplitude / floor
+        if worst is not None:
+            yield worst
+
+
+def _oscillating(flight: _Flight, uav: int) -> Iterator[tuple[str, str, Array, float]]:
+    """What may oscillate: name, unit, values, and the amplitude up to which it may."""
+    for actuator in _actuators(flight, uav):
+        x = flight.signals.column(f"{actuator.name}_command", uav)
+        yield actuator.name, unit_of(actuator.name), x, RIPPLE * actuator.travel
+    for error in flight.mission.scheme.tracking:
+        floor = error.bound if isinstance(error.bound, float) else ALLOWED.get(error.unit)
+        if floor is not None and flight.has(error.name):
+            yield error.name, error.unit, flight.of(error.name, uav), floor
+
+
+def _given(flight: _Flight) -> list[float]:
+    """Frequencies that the scenario or the ground commands, rad/s.
+
+    Leaders' motion, what UAVs refer to by themselves, and what fails or disturbs in a rhythm, as an intermittent fault
+    does.
+    """
+    signals = flight.signals
+    own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]
+    conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
+    columns = [(uav, name) for uav in flight.graph.leaders if len(flight.times.get(uav, _NEVER)) for name in ("z", "V")]
+    columns += [(uav, name) for uav in flight.followers for name in own + conditions]
+    found = (oscillation(flight.times[uav], signals.column(name, uav)) for uav, name in columns)
+    return [one.frequency for one in found if one is not None]

@@ -1,0 +1,246 @@
+"""How a flight went: what was found, and one word for it.
+
+- **failed**: an aircraft was lost or its recording ended early; or at the end a tracking error was larger than what its
+  scheme allows, a UAV was outside a bound of its scheme, or an oscillation did not decay.
+- **with remarks**: none of that, but a bound was left for a while, an actuator was at its limits for long, the flight
+  ended before its time, or nothing says what the scheme tracks.
+- **as it should**: nothing to remark.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ftcc.groundside.text import ids
+
+__all__ = [
+    "AS_IT_SHOULD",
+    "FAILED",
+    "FILE",
+    "REMARKS",
+    "SCHEMA_VERSION",
+    "LimitCycle",
+    "Loss",
+    "Outside",
+    "Saturation",
+    "TrackingError",
+    "Verdict",
+    "size",
+]
+
+SCHEMA_VERSION = 1
+"""Of ``verdict.json``."""
+
+AS_IT_SHOULD, REMARKS, FAILED = "as it should", "with remarks", "failed"
+"""The words."""
+
+FILE = "verdict.json"
+"""In a run's folder."""
+
+_SEVERITY = {AS_IT_SHOULD: "info", REMARKS: "warning", FAILED: "error"}
+
+
+@dataclass(frozen=True)
+class TrackingError:
+    """A tracking error over the flight, of all UAVs together."""
+
+    name: str
+    """Expression over recorded columns."""
+    unit: str
+    meaning: str
+    largest: float
+    """Absolute value."""
+    uav: int
+    at: float
+    """Whose it was, and when, s."""
+    end: float
+    """Largest absolute value in the end, of those UAVs that flew until then."""
+    end_uav: int
+    allowed: float | None
+    """What it may be in the end; None where nothing says it."""
+    too_large: bool
+    """In the end."""
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A bound that a UAV left."""
+
+    name: str
+    meaning: str
+    uav: int
+    seconds: float
+    until: float
+    """When it was outside last, s."""
+    at_end: bool
+    """Outside in the end of the flight."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """How long a commanded actuator was at a limit."""
+
+    actuator: str
+    uav: int
+    share: float
+    """Of the time that the UAV flew."""
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """An oscillation that did not decay."""
+
+    signal: str
+    unit: str
+    uav: int
+    frequency: float
+    """rad/s."""
+    amplitude: float
+    """In the end."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A UAV that did not end the flight."""
+
+    uav: int
+    at: float
+    """s."""
+    why: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a flight went."""
+
+    flown: float
+    """s."""
+    planned: float
+    """s."""
+    tracking: tuple[TrackingError, ...]
+    """In the order in which the scheme declares them; empty where it declares none."""
+    outside: tuple[Outside, ...]
+    saturation: tuple[Saturation, ...]
+    """All that ever was, the longest first."""
+    saturated: tuple[Saturation, ...]
+    """Those that were for long."""
+    limit_cycles: tuple[LimitCycle, ...]
+    """The largest of each UAV."""
+    lost: tuple[Loss, ...]
+
+    @property
+    def failures(self) -> list[str]:
+        """What makes the flight a failed one."""
+        return [
+            *(f"UAV {loss.uav} lost at {loss.at:.1f} s: {loss.why}" for loss in self.lost),
+            *(_too_large(error) for error in self.tracking if error.too_large),
+            *_bounds([one for one in self.outside if one.at_end], "left, and outside in the end"),
+            *_limit_cycles(self.limit_cycles),
+        ]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is worth knowing of a flight that did not fail."""
+        short = self.flown < self.planned
+        return [
+            *([f"ended at {self.flown:g} of {self.planned:g} s"] if short else []),
+            *([] if self.tracking else ["nothing says what the scheme tracks"]),
+            *_bounds([one for one in self.outside if not one.at_end], "left for a while"),
+            *_saturations(self.saturated),
+        ]
+
+    @property
+    def word(self) -> str:
+        """The closing word."""
+        if self.failures:
+            return FAILED
+        return REMARKS if self.remarks else AS_IT_SHOULD
+
+    @property
+    def severity(self) -> str:
+        """Of the event that tells it."""
+        return _SEVERITY[self.word]
+
+    @property
+    def text(self) -> str:
+        """The verdict in one line."""
+        reasons = [*self.failures, *self.remarks]
+        return f"verdict: {self.word}" + (f": {'; '.join(reasons)}" if reasons else "")
+
+    @property
+    def largest(self) -> list[str]:
+        """The tracking errors, a line each."""
+        return [
+            f"{error.meaning} ({error.name}): {size(error.largest, error.unit)} (UAV {error.uav} at {error.at:.1f} s), "
+            f"{size(error.end, error.unit)} in the end"
+            for error in self.tracking
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """For programs: the content of ``verdict.json``."""
+        found = asdict(self)
+        del found["saturated"]
+        for one in found["tracking"]:
+            # JSON knows no nan: a number that nobody has is null.
+            one |= {key: None for key in ("largest", "end") if not math.isfinite(one[key])}
+        return {
+            "schema": SCHEMA_VERSION,
+            "verdict": self.word,
+            "failures": self.failures,
+            "remarks": self.remarks,
+            **found,
+        }
+
+    def dumps(self) -> str:
+        """The same as text."""
+        return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
+
+
+def size(value: float, unit: str) -> str:
+    """A number with its unit; angles in degrees."""
+    if unit.startswith("rad"):
+        return f"{math.degrees(value):.3g} deg{unit.removeprefix('rad')}"
+    return f"{value:.3g} {unit}".removesuffix(" -")
+
+
+def _too_large(error: TrackingError) -> str:
+    allowed = "" if error.allowed is None else f", {size(error.allowed, error.unit)} allowed"
+    return f"{error.meaning} ({error.name}) is {size(error.end, error.unit)} in the end (UAV {error.end_uav}{allowed})"
+
+
+def _named(found: Iterable[Any], key: str) -> Iterator[tuple[str, list[Any]]]:
+    """Findings by what they are about, the largest first."""
+    for name in dict.fromkeys(getattr(one, key) for one in found):
+        yield name, [one for one in found if getattr(one, key) == name]
+
+
+def _who(found: Iterable[Any]) -> str:
+    return f"UAV {ids(one.uav for one in found)}"
+
+
+def _bounds(found: Iterable[Outside], how: str) -> list[str]:
+    return [
+        f"{name} {how}, for up to {max(one.seconds for one in those):.3g} s: {_who(those)}"
+        for name, those in _named(list(found), "name")
+    ]
+
+
+def _saturations(found: Iterable[Saturation]) -> list[str]:
+    told = []
+    for name, those in _named(list(found), "actuator"):
+        most = f"{100.0 * max(one.share for one in those):.0f} % of the time"
+        told.append(f"{name.replace('_', ' ')} at its limits for up to {most}: {_who(those)}")
+    return told
+
+
+def _limit_cycles(found: Iterable[LimitCycle]) -> list[str]:
+    told = []
+    for name, those in _named(list(found), "signal"):
+        worst = max(those, key=lambda one: one.amplitude)
+        what = f"{worst.frequency:.2g} rad/s, up to +-{size(worst.amplitude, worst.unit)}"
+        told.append(f"limit cycle of {name.replace('_', ' ')}, {what}: {_who(those)}")
+    return told
