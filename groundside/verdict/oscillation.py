@@ -1,7 +1,8 @@
 """Limit cycles: oscillations that go on, told from transients, noise and what somebody commands.
 
-The criterion is spectral. In the last third of a signal, one line above the slowest that counts must hold most of the
-power, and its amplitude, followed through three overlapping halves of that third, must not decay.
+In the last third of a signal, one line of the spectrum must hold most of the power of all that is faster than a drift;
+and, period by period, the signal must swing about its mean over a period by more than what matters, in each of the
+last periods, and in the end by no less than half of what it did in the beginning of that third.
 """
 
 from __future__ import annotations
@@ -17,40 +18,44 @@ __all__ = ["LEAST_PERIODS", "Oscillation", "is_driven", "oscillation"]
 Array = NDArray[np.float64]
 
 LEAST_PERIODS = 8
-"""In the last third: what is slower is taken for a drift or a manoeuvre."""
-_SHARE = 0.5
-"""Of the power at `LEAST_PERIODS` and faster that the line and its neighbourhood must hold."""
-_WIDTH = 0.1
+"""In the last third: what is slower is taken for a drift or a manoeuvre. In all of the last so many it must swing."""
+SHARE = 0.5
+"""Of the power of what is not slower that the line and its neighbourhood must hold."""
+WIDTH = 0.1
 """Half-width of that neighbourhood, as a share of the frequency; two lines of the spectrum at least."""
-_DECAY = 0.7
-"""An amplitude that in the end is less than this share of the largest decays."""
+DECAY = 0.5
+"""An amplitude that in the end is less than this share of the one before decays."""
+
 _HARMONICS = (1.0, 2.0, 3.0)
 """What answers a commanded oscillation comes at its frequency or at these multiples of it."""
 
 
 class Oscillation(NamedTuple):
-    """A line that dominates the end of a signal."""
+    """What a signal does in the end, over and over."""
 
     frequency: float
     """rad/s."""
     amplitude: float
-    """At the end, in the unit of the signal."""
+    """Half of what it swings from peak to peak, in the unit of the signal: median of the last periods."""
 
 
 def _spectrum(x: Array) -> Array:
-    """Power of each line of ``x`` without its straight trend, under a Hann window; their sum is the mean power."""
+    """Power of each line of ``x`` without its straight trend, under a Hann window."""
     n = len(x)
     s = np.arange(n) - (n - 1) / 2.0
-    window = np.hanning(n)
     straight = x - x.mean() - s * ((s * x).sum() / (s * s).sum())
-    found: Array = 2.0 * np.abs(np.fft.rfft(straight * window)) ** 2 / (n * (window * window).sum())
+    found: Array = np.abs(np.fft.rfft(straight * np.hanning(n))) ** 2
     return found
 
 
-def _around(line: float) -> slice:
-    """The neighbourhood of a line."""
-    half = max(2.0, _WIDTH * line)
-    return slice(max(0, round(line - half)), round(line + half) + 1)
+def _swings(x: Array, period: int) -> Array:
+    """Half of peak to peak in each period of so many rows, of ``x`` less its mean over a period around it."""
+    total = np.concatenate([[0.0], np.cumsum(x - x[0])])
+    mean = (total[period:] - total[:-period]) / period + x[0]
+    swinging = x[period // 2 :][: len(mean)] - mean
+    count = len(swinging) // period
+    found: Array = np.ptp(swinging[len(swinging) - count * period :].reshape(count, period), axis=1) / 2.0
+    return found
 
 
 def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
@@ -59,33 +64,32 @@ def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
     Parameters
     ----------
     t, x : arrays (n,)
-        Times (s), evenly spaced, and values.
+        Times (s), evenly spaced, and values; what is not finite in the end is left out.
     floor : float
         Least amplitude that matters.
     """
-    # Rows at the end may lack what one of two processes has not written.
-    x = x[: int(np.flatnonzero(np.isfinite(x))[-1]) + 1] if np.isfinite(x).any() else x[:0]
+    known = np.flatnonzero(np.isfinite(x))
+    rows = int(known[-1]) + 1 if len(known) else 0
     # A length of many factors two, of which a spectrum is quickly made.
-    n = len(x) // 3
-    n -= n % 64
-    third = np.ascontiguousarray(x[len(x) - n :])
-    if n < 4 * LEAST_PERIODS or not np.isfinite(third).all() or np.ptp(third[n // 2 :]) <= 2.0 * floor:
+    n = rows // 3 - rows // 3 % 64
+    x = np.ascontiguousarray(x[rows - n : rows])
+    if n < 4 * LEAST_PERIODS or not np.isfinite(x).all() or np.ptp(x[-n // LEAST_PERIODS :]) <= 2.0 * floor:
         return None
-    power = _spectrum(third)
+    power = _spectrum(x)
     line = LEAST_PERIODS + int(np.argmax(power[LEAST_PERIODS:]))
-    all_of_it = float(power[LEAST_PERIODS:].sum())
+    half = max(2.0, WIDTH * line)
+    neighbourhood = power[max(0, round(line - half)) : round(line + half) + 1]
     # The flank of something slower is no line.
-    if power[line] <= power[line - 1] or power[_around(line)].sum() < _SHARE * all_of_it:
+    if power[line] <= power[line - 1] or neighbourhood.sum() < SHARE * power[LEAST_PERIODS:].sum():
         return None
-    half = n // 2
-    parts = (third[start : start + half] for start in (0, (n - half) // 2, n - half))
-    amplitudes = [float(np.sqrt(2.0 * _spectrum(part)[_around(line * half / n)].sum())) for part in parts]
-    if amplitudes[-1] <= floor or amplitudes[-1] < _DECAY * max(amplitudes):
+    swings = _swings(x, round(n / line))
+    last, quarter = swings[1 - LEAST_PERIODS :], max(1, len(swings) // 4)
+    before, after = float(np.median(swings[:quarter])), float(np.median(swings[-quarter:]))
+    if last.min() <= floor or last.min() < DECAY * last.max() or after < DECAY * before:
         return None
-    duration = float(t[-1] - t[-2]) * n
-    return Oscillation(2.0 * np.pi * line / duration, amplitudes[-1])
+    return Oscillation(2.0 * np.pi * line / (float(t[1] - t[0]) * n), float(np.median(last)))
 
 
 def is_driven(frequency: float, given: Iterable[float]) -> bool:
     """Whether an oscillation answers one of ``given`` frequencies (rad/s), or is a multiple of it."""
-    return any(abs(frequency - n * one) <= _WIDTH * frequency for one in given for n in _HARMONICS)
+    return any(abs(frequency - n * one) <= WIDTH * frequency for one in given for n in _HARMONICS)
