@@ -149,7 +149,7 @@ SIGNALS = (
 )
 TRACKING = (
     Q("z - z_d", "m", "altitude off its place between the leaders", bound=2.0),
-    Q("S5", "m/s", "speed tracking error", bound=0.5),
+    Q("S5", "m/s", "speed tracking error", bound=1.0),
 )
 GRAPH = Assumption.UNDIRECTED_LEADERS_REACH_ALL
 COMMANDS = ("thrust", "elevator")

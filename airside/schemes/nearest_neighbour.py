@@ -163,7 +163,7 @@ SIGNALS = (
 )
 TRACKING = (
     Q("z - z_d", "m", "altitude off the leader's", bound=2.0),
-    Q("S1", "m/s", "speed tracking error", bound=0.5),
+    Q("S1", "m/s", "speed tracking error", bound=1.0),
 )
 BRIEFED = True
 """The first tick already compares the own motion with the neighbours'."""

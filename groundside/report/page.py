@@ -106,7 +106,7 @@ def verdict_section(verdict: Verdict) -> Section:
     for error in verdict.tracking:
         largest = f"{size(error.largest, error.unit)} at {error.at:.1f} s"
         allowed = "" if error.allowed is None else f" ({size(error.allowed, error.unit)} allowed)"
-        end = f"in the end {size(error.end, error.unit)}, UAV {error.end_uav}{allowed}"
+        end = "" if error.end is None else f"in the end {size(error.end, error.unit)}, UAV {error.end_uav}{allowed}"
         rows.append([Cell(f"{error.meaning}, {error.name}"), Cell(str(error.uav)), Cell(largest), Cell(end)])
     for left in verdict.outside:
         until = "in the end" if left.at_end else f"until {left.until:.1f} s"

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _NEVER: Array = np.empty(0)
 
 END, LEAST_END = 0.05, 2.0
-"""What counts as the end of a flight, for errors and bounds: this share of it, and so many seconds at least."""
+"""What counts as the end of a flight, for errors and bounds: this share of it, so many seconds at least."""
 HULL = 1.0
 """How far outside the leaders' hull a UAV may be, m; counted from when it first was inside."""
 LONG = 0.2
@@ -44,7 +44,7 @@ _CLOSE = 1e-6
 
 _HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
           "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
-"""Who tracks a place between the leaders shall be between them."""
+"""Where leaders are several, all shall be between their altitudes, and who tracks ``x_d`` between their positions."""
 
 
 def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
@@ -58,7 +58,7 @@ def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, st
     lost : mapping
         When (s) and why a UAV was lost, by id.
     """
-    flight = _Flight(signals, mission)
+    flight = _Flight(signals, mission, lost)
     saturation = sorted(_saturation(flight), key=lambda one: -one.share)
     return Verdict(
         flown=flight.end if flight.end < mission.timing.duration - flight.row - _CLOSE else mission.timing.duration,
@@ -68,30 +68,31 @@ def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, st
         saturation=tuple(saturation),
         saturated=tuple(one for one in saturation if one.share > LONG),
         limit_cycles=tuple(_limit_cycles(flight)),
-        lost=tuple(_losses(flight, lost)),
+        lost=tuple(_losses(flight)),
     )
 
 
 class _Flight:
     """A recording with what its mission says of it."""
 
-    def __init__(self, signals: Signals, mission: Mission) -> None:
+    def __init__(self, signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> None:
         self.signals = signals
         self.mission = mission
         self.graph = mission.graph
+        self.lost = lost
         self._values: dict[tuple[str, int], Array] = {}
         self.row = mission.timing.record_every * mission.timing.period
         """Time from row to row, s."""
         self.times = {uav: signals.column("t", uav) for uav in signals.uavs}
         self.end = max((float(t[-1]) for t in self.times.values() if len(t)), default=0.0)
-        self.closing = self.end - max(END * self.end, LEAST_END) - _CLOSE
+        self.closing = self.end - min(max(END * self.end, LEAST_END), self.end / 2.0) - _CLOSE
         """When the end begins, s."""
         self.followers = [uav for uav in self.graph.followers if len(self.times.get(uav, _NEVER))]
 
     def lasted(self, uav: int) -> bool:
         """Whether a UAV flew to the end."""
         t = self.times.get(uav, _NEVER)
-        return bool(len(t)) and t[-1] >= self.end - _TOGETHER
+        return uav not in self.lost and bool(len(t)) and t[-1] >= self.end - _TOGETHER
 
     def of(self, expression: str, uav: int) -> Array:
         """An expression at all times of a UAV."""
@@ -107,10 +108,10 @@ class _Flight:
         return names - places <= set(self.signals.names) and (led or not places)
 
 
-def _losses(flight: _Flight, lost: Mapping[int, tuple[float, str]]) -> Iterator[Loss]:
+def _losses(flight: _Flight) -> Iterator[Loss]:
     for uav in flight.mission.uavs:
-        if uav in lost:
-            yield Loss(uav, *lost[uav])
+        if uav in flight.lost:
+            yield Loss(uav, *flight.lost[uav])
         elif flight.end > 0.0 and not flight.lasted(uav):
             t = flight.times.get(uav, _NEVER)
             yield Loss(uav, float(t[-1]) if len(t) else 0.0, "its recording ends")
@@ -138,10 +139,11 @@ def _tracking(flight: _Flight) -> Iterator[TrackingError]:
                 too_large |= allowed is not None and bool((x[late] > np.broadcast_to(allowed, x.shape)[late]).any())
         if largest[0] < 0.0:
             continue
-        size = _allowed(flight, error.bound, error.unit, end[1]) if end[1] else None
-        allowed_at_end = None if size is None else float(np.min(size))
-        at_end = end if end[1] else (float("nan"), 0)
-        yield TrackingError(error.name, error.unit, error.meaning, *largest, *at_end, allowed_at_end, too_large)
+        size, whose = end if end[1] else (None, None)
+        small = None if whose is None else _allowed(flight, error.bound, error.unit, whose)
+        # A bound that is a signal counts as it is in the end.
+        least = None if small is None else float(np.ravel(small)[-1])
+        yield TrackingError(error.name, error.unit, error.meaning, *largest, size, whose, least, too_large)
 
 
 def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) -> Array | float | None:
@@ -162,11 +164,8 @@ def _outside(flight: _Flight) -> Iterator[Outside]:
         return
     tracked = frozenset[str]().union(*(names_in(error.name) for error in flight.mission.scheme.tracking))
     for place, (distance, name) in _HULLS.items():
-        if not flight.has(distance) or (place not in tracked and flight.mission.scheme.plant != "longitudinal"):
-            continue
-        if place == "x_d" and place not in tracked:
-            continue
-        for uav in flight.followers:
+        asked = place in tracked or place == "z_d"
+        for uav in flight.followers if asked and flight.has(distance) else ():
             away = flight.of(distance, uav)
             inside = away <= HULL
             entered = np.logical_or.accumulate(inside) | ~inside.any()

@@ -57,9 +57,9 @@ class TrackingError:
     uav: int
     at: float
     """Whose it was, and when, s."""
-    end: float
-    """Largest absolute value in the end, of those UAVs that flew until then."""
-    end_uav: int
+    end: float | None
+    """Largest absolute value in the end, of those UAVs that flew until then; None without any."""
+    end_uav: int | None
     allowed: float | None
     """What it may be in the end; None where nothing says it."""
     too_large: bool
@@ -175,8 +175,8 @@ class Verdict:
     def largest(self) -> list[str]:
         """The tracking errors, a line each."""
         return [
-            f"{error.meaning} ({error.name}): {size(error.largest, error.unit)} (UAV {error.uav} at {error.at:.1f} s), "
-            f"{size(error.end, error.unit)} in the end"
+            f"{error.meaning} ({error.name}): {size(error.largest, error.unit)} (UAV {error.uav} at {error.at:.1f} s)"
+            + (f", {size(error.end, error.unit)} in the end" if error.end is not None else "")
             for error in self.tracking
         ]
 
@@ -184,9 +184,6 @@ class Verdict:
         """For programs: the content of ``verdict.json``."""
         found = asdict(self)
         del found["saturated"]
-        for one in found["tracking"]:
-            # JSON knows no nan: a number that nobody has is null.
-            one |= {key: None for key in ("largest", "end") if not math.isfinite(one[key])}
         return {
             "schema": SCHEMA_VERSION,
             "verdict": self.word,
@@ -200,8 +197,10 @@ class Verdict:
         return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
 
 
-def size(value: float, unit: str) -> str:
-    """A number with its unit; angles in degrees."""
+def size(value: float | None, unit: str) -> str:
+    """A number with its unit, angles in degrees; "-" without one."""
+    if value is None:
+        return "-"
     if unit.startswith("rad"):
         return f"{math.degrees(value):.3g} deg{unit.removeprefix('rad')}"
     return f"{value:.3g} {unit}".removesuffix(" -")
