@@ -25,6 +25,8 @@ WIDTH = 0.1
 """Half-width of that neighbourhood, as a share of the frequency; two lines of the spectrum at least."""
 DECAY = 0.5
 """An amplitude that in the end is less than this share of the one before decays."""
+STEADY = 0.3
+"""The least of the last periods must be this share of the largest of them: several lines may beat."""
 
 _HARMONICS = (1.0, 2.0, 3.0)
 """What answers a commanded oscillation comes at its frequency or at these multiples of it."""
@@ -85,7 +87,7 @@ def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
     swings = _swings(x, round(n / line))
     last, quarter = swings[1 - LEAST_PERIODS :], max(1, len(swings) // 4)
     before, after = float(np.median(swings[:quarter])), float(np.median(swings[-quarter:]))
-    if last.min() <= floor or last.min() < DECAY * last.max() or after < DECAY * before:
+    if last.min() <= floor or last.min() < STEADY * last.max() or after < DECAY * before:
         return None
     return Oscillation(2.0 * np.pi * line / (float(t[1] - t[0]) * n), float(np.median(last)))
 

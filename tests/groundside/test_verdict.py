@@ -180,7 +180,7 @@ def test_the_demo_went_as_it_should(demo_run: Run) -> None:
 def test_a_lower_loop_twice_as_slow_cycles_in_all_four_aircraft(tmp_path: Path) -> None:
     # Table of chapter 9's reference: "all three 2 x slower: limit cycle, n and mu to their limits".
     slow = ["plant.lag.thrust=10", "plant.lag.bank=2.5", "plant.lag.load_factor=4"]
-    flight = fly(resolve(load("fire_monitoring", settings=[*slow, "duration=150"])))
+    flight = fly(resolve(load("fire_monitoring", settings=slow)))
     assert flight.verdict.word == FAILED
     assert [one.uav for one in flight.verdict.limit_cycles] == [1, 2, 3, 4]
     assert all(1.0 < one.frequency < 6.0 for one in flight.verdict.limit_cycles)
