@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +16,7 @@ from ftcc.airside.references.profiles import Profile, climb_range, largest_accel
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.airside.spec import OwnReference
+from ftcc.groundside.metrics import check_expression
 from ftcc.groundside.scenario import Scenario, ScenarioError, whole
 from ftcc.groundside.schema import Plan, Rates, Start
 from ftcc.groundside.table import LEADING
@@ -33,6 +34,7 @@ __all__ = [
     "briefings",
     "check_delays",
     "check_scheme",
+    "check_tracking",
     "followed_by_gains",
     "gains_of",
     "graph_of",
@@ -88,6 +90,18 @@ def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
         )
     findings.stop_if_refused()
     return scheme
+
+
+def check_tracking(scheme: Scheme, columns: Sequence[str], findings: Findings) -> None:
+    """Tracking errors and bounds must be arithmetic over recorded columns."""
+    expressions = [("TRACKING", error.name) for error in scheme.tracking]
+    expressions += [("TRACKING", error.bound) for error in scheme.tracking if isinstance(error.bound, str)]
+    expressions += [("SIGNALS", signal.bound) for signal in scheme.signals if isinstance(signal.bound, str)]
+    for where, expression in expressions:
+        try:
+            check_expression(expression, columns)
+        except ValueError as problem:
+            findings.refuse(f"scheme = {scheme.name!r}: {where}: {problem}")
 
 
 def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:

@@ -23,6 +23,7 @@ from ftcc.groundside.checks import (
     briefings,
     check_delays,
     check_scheme,
+    check_tracking,
     followed_by_gains,
     gains_of,
     graph_of,
@@ -174,6 +175,7 @@ def resolve(scenario: Scenario) -> Mission:
     clearance = ["clearance"] if obstacles else []
     names = (*leading(plant.ACTUATORS), *clearance, *(quantity.name for quantity in scheme.signals))
     findings.refused += check_claims(plan.claims, graph, names)
+    check_tracking(scheme, names, findings)
     findings.stop_if_refused()
 
     known = briefings(scheme, vehicles, profiles)

@@ -80,10 +80,32 @@ def test_simulate_records_where_it_says(ftcc: Callable[..., Outcome], tmp_path: 
 
 def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
     settings = ("--set", "faults.0.at=20", "--set", "faults.0.bias=0.6", "--set", "faults.0.without_trim=true")
-    code, _, err = ftcc("simulate", "containment", "--duration", 40, "--out", tmp_path / "run", *settings)
+    code, out, err = ftcc("simulate", "containment", "--duration", 40, "--out", tmp_path / "run", *settings)
     assert code == 1
     assert "no level trim" in err
-    assert "UAV 1 lost" in err
+    assert "UAV 1 lost at 26.3 s: flight-path angle left the model" in out
+
+
+@pytest.mark.parametrize(
+    ("settings", "strict", "code", "verdict"),
+    [
+        ([], True, 0, "as it should"),
+        (["gains.k41=80"], False, 0, "failed"),
+        (["gains.k41=80"], True, 3, "failed"),
+        (["plant.limits.thrust=[0.0, 22.0]"], True, 0, "with remarks"),
+    ],
+)
+def test_simulate_ends_with_a_verdict_and_strict_by_it(
+    ftcc: Callable[..., Outcome], tmp_path: Path, settings: list[str], strict: bool, code: int, verdict: str
+) -> None:
+    options = [part for setting in settings for part in ("--set", setting)]
+    given = ("containment", "--duration", 40, "--out", "run", *options)
+    result, out, _ = ftcc("simulate", *given, *(["--strict"] if strict else []))
+    assert result == code
+    assert f"verdict: {verdict}" in out
+    assert json.loads((tmp_path / "run" / "verdict.json").read_text())["verdict"] == verdict
+    assert ("limit cycle of elevator" in out) == (verdict == "failed")
+    assert ftcc("report", "run", "--no-page", *(["--strict"] if strict else []))[0] == code
 
 
 def test_report_prints_the_claims_and_ends_with_0_if_all_hold(ftcc: Callable[..., Outcome], demo_run: Run) -> None:
@@ -98,7 +120,8 @@ def test_report_json_has_the_promised_fields(ftcc: Callable[..., Outcome], demo_
     code, out, _ = ftcc("report", demo_run.path, "--json")
     report = json.loads(out)
     assert code == 0
-    assert list(report) == ["scenario", "form", "variant", "claims"]
+    assert list(report) == ["scenario", "form", "variant", "verdict", "claims"]
+    assert report["verdict"]["verdict"] == "as it should"
     assert (report["scenario"], report["form"], report["variant"]) == ("demo", "flight", "")
     claim = report["claims"][3]
     assert list(claim) == ["name", "uavs", "window", "value", "unit", "expected", "tolerance", "source", "ok"]
