@@ -195,7 +195,7 @@ SIGNALS = (
     Q("rudder_wanted", "rad", "rudder before its limits"),
 )
 TRACKING = (
-    Q("mu - mu_d", "rad", "bank off its reference", bound=math.radians(3.0)),
+    Q("wrapped(mu - mu_d)", "rad", "bank off its reference", bound=math.radians(3.0)),
     Q("alpha - alpha_d", "rad", "angle of attack off its reference", bound=math.radians(3.0)),
     Q("beta - beta_d", "rad", "sideslip off its reference", bound=math.radians(3.0)),
 )
