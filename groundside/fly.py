@@ -20,7 +20,7 @@ from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.pace import Setup, usable_cores
 from ftcc.groundside.pacing import Pacing
 from ftcc.groundside.registry import Card, Control, Entry
-from ftcc.groundside.run import NothingRecordedError, Run
+from ftcc.groundside.run import Run, RunError
 from ftcc.groundside.snapshot import Event, Pace
 from ftcc.groundside.verdict import FILE, judge
 from ftcc.link.ground import LISTENERS, Address
@@ -266,12 +266,15 @@ def _conclude(flight: _Flight) -> None:
     run = Run(flight.swarm.folder)
     try:
         verdict = judge(run, flight.mission, run.lost)
-    except NothingRecordedError:
+    except RunError:
+        # What has been recorded cannot be read, or is nothing: the log says why.
         return
     flight.swarm.outcome.verdict = verdict
     (run.path / FILE).write_text(verdict.dumps(), encoding="utf-8")
     flight.log.write(run.end, verdict.text, severity=verdict.severity)
     flight.station.note(Event(run.end, verdict.severity, verdict.text))
+    if not flight.station.complete:
+        return
     snapshot = flight.station.snapshot()
     if flight.feed is not None:
         flight.feed.offer(snapshot)

@@ -87,18 +87,17 @@ def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome
 
 
 @pytest.mark.parametrize(
-    ("settings", "strict", "code", "verdict"),
+    ("options", "strict", "code", "verdict"),
     [
         ([], True, 0, "as it should"),
-        (["gains.k41=80"], False, 0, "failed"),
-        (["gains.k41=80"], True, 3, "failed"),
-        (["plant.limits.thrust=[0.0, 22.0]"], True, 0, "with remarks"),
+        (["--set", "gains.k41=80"], False, 0, "failed"),
+        (["--set", "gains.k41=80"], True, 3, "failed"),
+        (["--variant", "high_5"], True, 0, "with remarks"),
     ],
 )
 def test_simulate_ends_with_a_verdict_and_strict_by_it(
-    ftcc: Callable[..., Outcome], tmp_path: Path, settings: list[str], strict: bool, code: int, verdict: str
+    ftcc: Callable[..., Outcome], tmp_path: Path, options: list[str], strict: bool, code: int, verdict: str
 ) -> None:
-    options = [part for setting in settings for part in ("--set", setting)]
     given = ("containment", "--duration", 40, "--out", "run", *options)
     result, out, _ = ftcc("simulate", *given, *(["--strict"] if strict else []))
     assert result == code

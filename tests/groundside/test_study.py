@@ -102,9 +102,10 @@ def test_all_combinations_fly_with_the_same_seeds(flown: tuple[Any, Path]) -> No
 def test_values_are_those_of_the_flight_alone(flown: tuple[Any, Path], scenario: Path) -> None:
     row = next(row for row in flown[0].to_pylist() if row["channel.loss"] == 0.3 and row["seed"] == 6)
     settings = ["channel.loss=0.3", "gains.phi=0.1"]
-    _, (altitude, hull, _) = claims_in_flight(load(scenario, settings=settings, seed=6))
+    flight, (altitude, hull, _) = claims_in_flight(load(scenario, settings=settings, seed=6))
     assert [row["altitude, UAV 1"], row["altitude, UAV 2"]] == altitude.value
     assert row["hull"] == hull.value
+    assert (row["verdict"], row["largest error"]) == (flight.verdict.word, flight.verdict.tracking[0].largest)
     assert row["later"] is None
     assert row["later holds"] is None
     assert row["wall"] > 0.0
@@ -123,6 +124,7 @@ def test_a_combination_that_is_refused_is_a_row_with_its_reason(flown: tuple[Any
         if row["gains.phi"] == TOO_STEEP:
             assert "unstable in Euler steps" in row["error"]
             assert row["hull"] is None
+            assert (row["verdict"], row["largest error"]) == (None, None)
         else:
             assert row["error"] is None
             assert row["lost"] == []

@@ -9,11 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ftcc.airside.scheme import Quantity
 from ftcc.groundside import Run
 from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.scenario import load
+from ftcc.groundside.replay import snapshots_of
+from ftcc.groundside.scenario import ScenarioError, load
 from ftcc.groundside.simulate import fly, record
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, FILE, REMARKS, Verdict, judge
+from ftcc.link.actuators import SLOT
+from ftcc.sim.plants import conditions_of
+from ftcc.sim.process import columns, places
 from tests.groundside.conftest import mission_of
 
 T = np.arange(0.0, 400.005, 0.01)
@@ -167,6 +172,59 @@ def test_every_tracking_error_of_a_scheme_can_be_said(scheme: str) -> None:
     found = fly(mission).verdict
     assert [one.name for one in found.tracking] == [one.name for one in mission.scheme.tracking]
     assert all(one.allowed is not None for one in found.tracking)
+
+
+def test_a_replay_ends_with_the_verdict(demo_run: Run) -> None:
+    *_, last = snapshots_of(demo_run, rate=0.007)
+    assert last.t < demo_run.end
+    assert last.events[-1].text == "verdict: as it should"
+
+
+def test_a_scheme_that_declares_what_is_not_recorded_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = (Quantity("z - z_dd", "m", "altitude", bound=1.0),)
+    monkeypatch.setattr(CONTAINMENT.scheme.module, "TRACKING", wrong)
+    with pytest.raises(ScenarioError, match="scheme = 'containment': TRACKING: 'z - z_dd': there is no column z_dd"):
+        mission_of("flight")
+
+
+def test_a_scheme_that_declares_nothing_is_judged_by_what_it_calls_a_tracking_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delattr(CONTAINMENT.scheme.module, "TRACKING")
+    found = verdict({2: {"S1": np.full(len(T100), 5.5), "S5": np.full(len(T100), 0.5)}})
+    assert [(one.name, one.allowed, one.too_large) for one in found.tracking] == [("S1", 5.0, True), ("S5", 1.0, False)]
+    monkeypatch.setattr(CONTAINMENT.scheme.module, "TRACKING", (), raising=False)
+    assert verdict().text == "verdict: with remarks: nothing says what the scheme tracks"
+
+
+def test_commands_are_planned_as_information_and_failures_as_warnings() -> None:
+    told = {text.split(":")[0]: severity for _, _, severity, text in mission_of("flight").events}
+    assert told["leader commanded to 1100 m"] == "info"
+    assert told["leader begins its cosine in altitude"] == "info"
+    assert told["elevator fault"] == "warning"
+    attitude = mission_of("flight", "directed_attitude").events
+    assert {severity for _, _, severity, text in attitude if text.startswith("commanded to")} == {"info"}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "actuators"),
+    [
+        ("fire_monitoring", ["bank", "load_factor", "thrust"]),
+        ("containment", ["elevator", "thrust"]),
+        ("directed_attitude", ["aileron", "elevator", "rudder", "thrust"]),
+    ],
+)
+def test_a_recording_has_columns_of_the_actuators_that_there_are(scenario: str, actuators: list[str]) -> None:
+    plant = mission_of("flight", scenario).plant
+    names = [column.name for column in columns(plant)]
+    assert [name for name in names if name in SLOT] == actuators
+    assert [name.removesuffix("_command") for name in names if name.endswith("_command")] == actuators
+    # A row is filled with all slots: t, uav, 13 of truth, commands, what acts, conditions.
+    width = 2 + 13 + 4 + 4
+    found = places(plant)
+    assert [found[names.index(name)] for name in actuators] == [19 + SLOT[name] for name in actuators]
+    assert found[names.index(f"{actuators[0]}_command")] == 15 + SLOT[actuators[0]]
+    assert found[-1] == len(conditions_of(plant)) + width - 1
 
 
 def test_the_demo_went_as_it_should(demo_run: Run) -> None:
