@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -125,8 +126,7 @@ def test_published_set_ups_pass_with_a_word_on_the_sufficient_condition():
 
 def test_start_outside_of_the_tube_is_refused():
     initial = {1: Reference(0.0, 30.0, 0.0, 1000.0, 0.0, 0.0), 2: Reference(0.0, 30.0, 0.0, 1002.5, 0.0, 0.0)}
-    flown = flight(GRAPH, 0.01)
-    flown = Flight(*(getattr(flown, name) for name in flown.__dataclass_fields__ if name != "initial"), initial)
+    flown = replace(flight(GRAPH, 0.01), initial=initial)
     assert "UAV 2 starts at z = 1002.5 m" in fatal(flown)
     assert "performance tube" in fatal(flown)
     assert fatal(flown, in_flight=1.0) == ""
