@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import annotated_types
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings, strategies
 from pydantic import BaseModel
 
@@ -113,6 +114,7 @@ def scenarios(draw: strategies.DrawFn) -> tuple[str, str, list[Change]]:
     return name, form, chosen
 
 
+@pytest.mark.timeout(900)  # alone, it compiles every law
 @settings(max_examples=TRIED, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
 @given(scenarios())
 def test_it_is_refused_with_a_sentence_or_flies(case: tuple[str, str, list[Change]]) -> None:
