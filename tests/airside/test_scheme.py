@@ -13,7 +13,8 @@ import pytest
 
 import ftcc.airside.schemes
 from ftcc.airside import schemes
-from ftcc.airside.scheme import Quantity, Scheme, load, quantities
+from ftcc.airside.ranges import FEEDBACK
+from ftcc.airside.scheme import Quantity, Scheme, SchemeError, load, quantities
 from ftcc.link.actuators import SLOT
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 from ftcc.link.graph import Assumption
@@ -175,7 +176,12 @@ def test_a_gain_that_nobody_gave_a_value_must_be_given(containment):
     class Gains(NamedTuple):
         k: Annotated[float, Quantity("k", "1/s")]
 
-    scheme = Scheme("mine", file_like(containment, Gains=Gains, FORMS={"flight": {}}))
+    scheme = Scheme("mine", file_like(containment, Gains=Gains, FORMS={"flight": {}}, RANGES={}))
     with pytest.raises(ValueError, match="gains k have no published value and must be given"):
         scheme.gains("flight", {})
     assert scheme.gains("flight", {"k": 2.0}).k == 2.0
+
+
+def test_a_range_of_a_gain_that_there_is_not_is_refused(containment):
+    with pytest.raises(SchemeError, match="RANGES name k99, which are no gains"):
+        Scheme("mine", file_like(containment, RANGES={FEEDBACK: "k11 k99"}))

@@ -24,7 +24,7 @@ from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.scenario import shipped
 from ftcc.groundside.simulate import fly
 
-TRIED = int(os.environ.get("FTCC_SCENARIOS", "100"))
+TRIED = int(os.environ.get("FTCC_SCENARIOS", "60"))
 SECONDS = 2.0
 NOT_FLOWN = ("title", "claims", "flown")
 """What no flight depends on."""

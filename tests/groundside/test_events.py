@@ -19,7 +19,8 @@ def mission(*settings: str, scenario: str = "containment") -> Mission:
 
 
 def told(found: Mission, word: str) -> list[tuple[float, int | None, str]]:
-    return [event for event in found.events if word in event[2]]
+    """Time, UAV and text of what is planned, with that word in it."""
+    return [(t, uav, text) for t, uav, _, text in found.events if word in text]
 
 
 def refused(*settings: str, scenario: str = "containment") -> str:
@@ -97,7 +98,7 @@ def test_a_leader_returns_to_what_was_commanded_before() -> None:
         (10.0, 1020.0, 30.0),
         (20.0, 1010.0, 30.0),
     ]
-    assert (20.0, 7, "leader commanded as before") in found.events
+    assert (20.0, 7, "info", "leader commanded as before") in found.events
 
 
 def test_an_attitude_returns_to_what_was_commanded_before() -> None:
@@ -114,7 +115,7 @@ def test_an_attitude_returns_to_what_was_commanded_before() -> None:
         (9.0, 0.0, 0.05),
         (12.0, 0.0, 0.06),
     ]
-    assert (9.0, 2, "commanded to the attitude before") in found.events
+    assert (9.0, 2, "info", "commanded to the attitude before") in found.events
 
 
 def test_a_fire_drifts_as_before() -> None:
@@ -122,7 +123,7 @@ def test_a_fire_drifts_as_before() -> None:
     first, moved, back = found.autopilots[0].reference.commands
     assert back[3:] == first[3:]
     assert (back.north - moved.north, back.east - moved.east) == pytest.approx((20.0, 10.0))
-    assert (25.0, None, "fire: it drifts as before") in found.events
+    assert (25.0, None, "info", "fire: it drifts as before") in found.events
 
 
 def test_gusts_come_and_go() -> None:
