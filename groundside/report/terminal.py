@@ -34,7 +34,7 @@ def show_verdict(console: Console, verdict: Verdict) -> None:
     lines = [f"[{_COLOURS[verdict.word]}]verdict: {verdict.word}[/]"]
     lines += [f"  [bold red]{escape(text)}[/]" for text in verdict.failures]
     lines += [f"  [yellow]{escape(text)}[/]" for text in verdict.remarks]
-    lines += [f"  [dim]largest {escape(text)}[/]" for text in verdict.largest]
+    lines += [f"  [dim]{escape(text)}[/]" for text in verdict.largest]
     for line in lines:
         console.print(line, highlight=False, soft_wrap=True)
 

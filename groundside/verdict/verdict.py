@@ -174,11 +174,7 @@ class Verdict:
     @property
     def largest(self) -> list[str]:
         """The tracking errors, a line each."""
-        return [
-            f"{error.meaning} ({error.name}): {size(error.largest, error.unit)} (UAV {error.uav} at {error.at:.1f} s)"
-            + (f", {size(error.end, error.unit)} in the end" if error.end is not None else "")
-            for error in self.tracking
-        ]
+        return [_told(error) for error in self.tracking]
 
     def as_json(self) -> dict[str, Any]:
         """For programs: the content of ``verdict.json``."""
@@ -206,9 +202,15 @@ def size(value: float | None, unit: str) -> str:
     return f"{value:.3g} {unit}".removesuffix(" -")
 
 
+def _told(error: TrackingError) -> str:
+    end = "" if error.end is None else f", {size(error.end, error.unit)} in the end"
+    largest = f"up to {size(error.largest, error.unit)}, UAV {error.uav} at {error.at:.1f} s"
+    return f"{error.meaning} ({error.name}): {largest}{end}"
+
+
 def _too_large(error: TrackingError) -> str:
     allowed = "" if error.allowed is None else f", {size(error.allowed, error.unit)} allowed"
-    return f"{error.meaning} ({error.name}) is {size(error.end, error.unit)} in the end (UAV {error.end_uav}{allowed})"
+    return f"{error.meaning} ({error.name}): {size(error.end, error.unit)} in the end, UAV {error.end_uav}{allowed}"
 
 
 def _named(found: Iterable[Any], key: str) -> Iterator[tuple[str, list[Any]]]:

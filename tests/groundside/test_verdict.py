@@ -91,7 +91,7 @@ def test_an_error_in_the_end_fails_the_flight() -> None:
     found = verdict({3: {"z": np.full(len(T100), 886.0)}})
     assert found.word == FAILED
     assert found.tracking[0].end == pytest.approx(114.0)
-    assert "is 114 m in the end (UAV 3, 2 m allowed)" in found.failures[0]
+    assert "(z - z_d): 114 m in the end, UAV 3, 2 m allowed" in found.failures[0]
     # It never was between the leaders.
     assert "hull of the leaders' altitudes left, and outside in the end, for up to 100 s: UAV 3" in found.failures[1]
 
