@@ -20,12 +20,8 @@ from ftcc.airside.spec import AutopilotSpec, Neighbour, OwnReference
 from ftcc.groundside.checks import (
     IDEAL,
     Findings,
-    briefings,
     check_delays,
-    check_scheme,
     check_tracking,
-    followed_by_gains,
-    gains_of,
     graph_of,
     limits_of,
     plant_of,
@@ -35,6 +31,7 @@ from ftcc.groundside.checks import (
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.faults import actuator_faults, check_ends, check_faults, fault_texts, navigation_faults
 from ftcc.groundside.fire import check_posts
+from ftcc.groundside.laws import briefings, check_scheme, followed_by_gains, gains_of
 from ftcc.groundside.leaders import check_clearance, limited, profiles_of
 from ftcc.groundside.links import link_changes, link_texts
 from ftcc.groundside.references import own_references, reference_texts
