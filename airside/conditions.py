@@ -27,7 +27,7 @@ def stable_in_steps(rates: Mapping[str, float], step: float) -> list[Problem]:
         Problem(
             True,
             f"gain {name}: its rate {rate:.0f} 1/s is unstable in Euler steps of {step * 1e3:g} ms: "
-            f"needs more than {rate / 2.0:.0f} steps a second (control rate times substeps, where there are some)",
+            f"needs more than {rate / 2.0:.0f} steps a second (control rate times substeps)",
         )
         for name, rate in rates.items()
         if rate * step >= 2.0

@@ -90,16 +90,20 @@ class Range(NamedTuple):
 
 _FAR = 10.0
 
-FEEDBACK = Range(0.0, 1e4, "the loop does not pull its error back, or outruns every aircraft", open=True, untried=_FAR)
+FEEDBACK = Range(
+    0.0, 1e4, "the loop does not pull its error back, or is too fast for any aircraft", open=True, untried=_FAR
+)
 """Of an error, or of an observer's error."""
-COUPLING = Range(0.0, 1e4, "it drives its error away, or outruns every aircraft", untried=_FAR)
+COUPLING = Range(0.0, 1e4, "it drives its error away, or is too fast for any aircraft", untried=_FAR)
 """Of a term that may be left out with 0."""
-FINITE_TIME = Range(0.0, 1e4, "the finite-time term drives its error away, or outruns every aircraft", untried=_FAR)
+FINITE_TIME = Range(
+    0.0, 1e4, "the finite-time term drives its error away, or is too fast for any aircraft", untried=_FAR
+)
 WEIGHT = Range(0.0, 1e3, "the errors that it weighs cancel, or drown all others", open=True, untried=_FAR)
 ADAPTATION = Range(0.0, 1e4, "the opposite is learnt, or it jumps at every step", untried=_FAR)
 LEAK = Range(0.0, 1e2, "what is learnt grows by itself, or is forgotten at once", untried=_FAR)
-FREQUENCY = Range(0.0, 1e4, "the filter runs away, or outruns every step", open=True, untried=_FAR)
-OPTIONAL_FREQUENCY = Range(0.0, 1e4, "the filter runs away, or outruns every step; 0 is off", untried=_FAR)
+FREQUENCY = Range(0.0, 1e4, "the filter runs away, or is too fast for any step", open=True, untried=_FAR)
+OPTIONAL_FREQUENCY = Range(0.0, 1e4, "the filter runs away, or is too fast for any step; 0 is off", untried=_FAR)
 FILTER_TIME = Range(0.0, 1e3, "the filter runs away, or lets nothing pass", open=True, untried=_FAR)
 OPTIONAL_TIME = Range(0.0, 1e3, "the filter runs away, or lets nothing pass; 0 is off", untried=_FAR)
 DAMPING = Range(0.0, 1e3, "the filter swings up, or stands still", open=True, untried=_FAR)
@@ -108,10 +112,10 @@ LAYER = Range(0.0, math.inf, "there is nothing to divide by", open=True, untried
 LIMIT = Range(0.0, math.inf, "nothing is let through", open=True)
 LIMIT_OR_OFF = Range(0.0, math.inf, "nothing is let through; 0 is no limit")
 ANGLE_LIMIT = Range(0.0, 0.5 * math.pi, "it limits no angle; 0 is no limit")
-TIME = Range(0.0, math.inf, "it lies before the start")
+TIME = Range(0.0, math.inf, "it is no span of time")
 EXPONENT = Range(0.0, 1.0, "the term is no finite-time term", open=True)
 INNER_SHARE = Range(0.0, 1.0, "there is nothing on one of its sides", open=True)
-SHARE = Range(0.0, 1.0, "it is no share")
+SHARE = Range(0.0, 1.0, "it is no fraction")
 STEPS = Range(1.0, 100.0, "no tick can be divided so", whole=True)
 SWITCH = Range(0.0, 1.0, "it is neither on nor off", only=(0.0, 1.0))
 ORDER = Range(0.0, 0.99, "the order is none of an integral below the first")

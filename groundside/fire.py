@@ -19,9 +19,10 @@ from ftcc.airside.references.position import Command, Fire, Reference, moved, re
 from ftcc.airside.spec import OwnReference
 from ftcc.groundside.checks import Findings
 from ftcc.groundside.schema import Plan
+from ftcc.groundside.trims import truth_at_start
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import plants
-from ftcc.sim.plant import CHI, GAMMA, TRUTH, Fault, V
+from ftcc.sim.plant import CHI, GAMMA, Fault, V
 from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["check_posts", "fire_commands", "fire_texts", "posts"]
@@ -218,9 +219,7 @@ def _check_actuator(
 
 
 def _check_start(vehicle: VehicleSpec, needed: _Needed, findings: Findings) -> None:
-    true = np.zeros(len(TRUTH))
-    plant = plants.find(vehicle.plant)
-    plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
+    true = truth_at_start(vehicle)
     away = float(np.linalg.norm(true[:3] - needed.motion[0, :3]))
     if away > _FAR:
         findings.warned.append(

@@ -7,20 +7,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ftcc.airside.references.profiles import Profile, climb_range, largest_acceleration
 from ftcc.airside.scheme import Flight, Problem, Reference, Scheme
 from ftcc.airside.spec import OwnReference
 from ftcc.groundside.checks import Findings, require_followers
 from ftcc.groundside.scenario import Scenario
 from ftcc.groundside.schema import Plan
+from ftcc.groundside.trims import truth_at_start
 from ftcc.link.graph import Graph
 from ftcc.link.rotation import wrapped
 from ftcc.link.timing import Timing
-from ftcc.sim import plants
-from ftcc.sim.plant import ALPHA, BETA, GAMMA, MU, TRUTH, V, X, Z
+from ftcc.sim.plant import ALPHA, BETA, GAMMA, MU, V, X, Z
 from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["briefings", "check_scheme", "followed_by_gains", "gains_of"]
@@ -135,24 +132,16 @@ def _initial_errors(
     """By UAV, where schemes refer to an attitude: by how much the first one is missed, rad."""
     errors = {}
     for vehicle in vehicles if scheme.plant == "attitude" else ():
-        own, true = references[vehicle.uav], _truth(vehicle)
+        own, true = references[vehicle.uav], truth_at_start(vehicle)
         if own is not None:
             mu, alpha, beta = own.initial[:3]
             errors[vehicle.uav] = (float(wrapped(true[MU] - mu)), float(true[ALPHA] - alpha), float(true[BETA] - beta))
     return errors
 
 
-def _truth(vehicle: VehicleSpec) -> NDArray[np.float64]:
-    """The state of an aircraft at its start, in the order of ``TRUTH``."""
-    plant = plants.find(vehicle.plant)
-    true = np.zeros(len(TRUTH))
-    plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
-    return true
-
-
 def _motion(vehicle: VehicleSpec) -> Reference:
     """The motion of an aircraft at its start."""
-    true = _truth(vehicle)
+    true = truth_at_start(vehicle)
     speed, gamma = float(true[V]), float(true[GAMMA])
     climb, forward = speed * math.sin(gamma), speed * math.cos(gamma)
     return Reference(x=float(true[X]), V=speed, V_dot=0.0, z=float(true[Z]), z_dot=climb, z_ddot=0.0, x_dot=forward)

@@ -7,15 +7,35 @@ from collections.abc import Iterable
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ftcc.airside.references.profiles import Profile
 from ftcc.groundside.checks import Findings
 from ftcc.groundside.schema import Plan
 from ftcc.link.actuators import SLOT, unit_of
-from ftcc.sim.plant import LOST
+from ftcc.sim import plants
+from ftcc.sim.plant import AIRSPEED, CLIMB, INCIDENCE, LOST, SIDESLIP, TRUTH, UNITS
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.trim import TrimError
 
-__all__ = ["check_starts", "check_trims", "disturbances_at", "instants", "level_trim", "speeds_at"]
+__all__ = ["check_starts", "check_trims", "disturbances_at", "instants", "level_trim", "speeds_at", "truth_at_start"]
+
+_GUARDED = {
+    AIRSPEED: ("V", "least_airspeed"),
+    CLIMB: ("gamma", "flight_path_angle"),
+    INCIDENCE: ("alpha", "angle_of_attack"),
+    SIDESLIP: ("beta", "sideslip"),
+}
+"""The quantity and the guard behind each reason for which an aircraft is lost."""
+
+
+def truth_at_start(vehicle: VehicleSpec) -> NDArray[np.float64]:
+    """The state of an aircraft at its start, in the order of ``TRUTH``."""
+    plant = plants.find(vehicle.plant)
+    true = np.zeros(len(TRUTH))
+    plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
+    return true
 
 
 def level_trim(
@@ -67,9 +87,14 @@ def check_starts(plan: Plan, plant: ModuleType, vehicles: Iterable[VehicleSpec],
     for vehicle in vehicles:
         if vehicle.kind != "aircraft" or math.isnan(sum(vehicle.initial)):
             continue
-        reason = plant.lost(plant.State(*vehicle.initial), vehicle.guards)
-        if reason:
-            findings.refuse(f"start of UAV {vehicle.uav}: {LOST[int(reason)]} (plant.guards says where it ends)")
+        reason = int(plant.lost(plant.State(*vehicle.initial), vehicle.guards))
+        if reason in _GUARDED:
+            quantity, guard = _GUARDED[reason]
+            value, unit = float(truth_at_start(vehicle)[TRUTH.index(quantity)]), UNITS[quantity]
+            findings.refuse(
+                f"start of UAV {vehicle.uav}: {LOST[reason]}: {quantity} = {value:.3g} {unit}, "
+                f"plant.guards.{guard} = {getattr(vehicle.guards, guard):g} {unit}"
+            )
     given = plan.plant.initial_actuators
     for name, position in given.items() if isinstance(given, dict) else ():
         low, high = getattr(plan.plant.limits, name) or (-math.inf, math.inf)

@@ -361,10 +361,16 @@ def _starts(gains: Gains, flight: Flight) -> list[Problem]:
     problems = []
     for uav, initial in flight.initial.items():
         away = initial.z - gains.z_start
-        text = f"UAV {uav} starts at z = {initial.z:g} m, {away:+g} m from the estimate's start (gain z_start)"
+        side = "above" if away > 0.0 else "below"
+        text = (
+            f"UAV {uav} starts at z = {initial.z:g} m, {abs(away):g} m {side} where its estimate starts (gain z_start)"
+        )
         if abs(away) > _FARTHEST_START:
             problems.append(
-                Problem(True, f"{text}: at most {_FARTHEST_START:g} m can be flown; in_flight = 1 starts where it is")
+                Problem(
+                    True,
+                    f"{text}: at most {_FARTHEST_START:g} m can be flown; gain in_flight = 1 starts the estimate there",
+                )
             )
         elif abs(away) > _FARTHEST_UNSHAPED and gains.shaper == 0.0:
             problems.append(Problem(False, f"{text}: without the shaper, aircraft were lost from 5 m on"))

@@ -4,7 +4,7 @@
   scheme allows, a UAV was outside a bound of its scheme, or an oscillation did not decay.
 - **with remarks**: none of that, but a bound was left for a while, an actuator was at its limits for long, the flight
   ended before its time, or nothing says what the scheme tracks.
-- **as it should**: nothing to remark.
+- **as it should be**: nothing to remark.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = [
 SCHEMA_VERSION = 1
 """Of ``verdict.json``."""
 
-AS_IT_SHOULD, REMARKS, FAILED = "as it should", "with remarks", "failed"
+AS_IT_SHOULD, REMARKS, FAILED = "as it should be", "with remarks", "failed"
 """The words."""
 
 FILE = "verdict.json"

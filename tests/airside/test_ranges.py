@@ -84,7 +84,7 @@ def test_a_range_holds_what_it_says(allowed: Range, good, bad):
         ("gains.horizon=-1", "gain horizon = -1: must be at least 0"),
         ("gains.a_max=0", "gain a_max = 0: must be above 0, else nothing is let through"),
         ("gains.guard=-1", "gain guard = -1: must be at least 0"),
-        ("gains.kappa=-3", "gain kappa = -3: must be from 0 to 1, else it is no share"),
+        ("gains.kappa=-3", "gain kappa = -3: must be from 0 to 1, else it is no fraction"),
         ("gains.acting=-7", "gain acting = -7: must be 0 or 1, else it is neither on nor off"),
     ],
 )

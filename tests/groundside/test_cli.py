@@ -89,7 +89,7 @@ def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome
 @pytest.mark.parametrize(
     ("options", "strict", "code", "verdict"),
     [
-        ([], True, 0, "as it should"),
+        ([], True, 0, "as it should be"),
         (["--set", "gains.k41=80"], False, 0, "failed"),
         (["--set", "gains.k41=80"], True, 3, "failed"),
         (["--variant", "high_5"], True, 0, "with remarks"),
@@ -120,7 +120,7 @@ def test_report_json_has_the_promised_fields(ftcc: Callable[..., Outcome], demo_
     report = json.loads(out)
     assert code == 0
     assert list(report) == ["scenario", "form", "variant", "verdict", "claims"]
-    assert report["verdict"]["verdict"] == "as it should"
+    assert report["verdict"]["verdict"] == "as it should be"
     assert (report["scenario"], report["form"], report["variant"]) == ("demo", "flight", "")
     claim = report["claims"][3]
     assert list(claim) == ["name", "uavs", "window", "value", "unit", "expected", "tolerance", "source", "ok"]

@@ -10,6 +10,7 @@ from ftcc.groundside.mission import Mission
 from ftcc.groundside.simulate import TooLargeError, fly
 
 MISSION_AT_500 = ["start.z=500", "leaders.7.z=500", "leaders.8.z=500", "leaders.7.commands.0.altitude=600"]
+GUARDED = "start of UAV 1: flight-path angle left the model: gamma = 1.5 rad, plant.guards.flight_path_angle = 1 rad"
 
 
 def mission(name: str, *settings: str, form: str = "flight", duration: float | None = None) -> Mission:
@@ -48,12 +49,20 @@ def test_flights_shorter_than_the_grid_of_the_checks_are_flown(name: str, durati
             ["plant.initial_actuators={elevator=2.0, thrust=20.0}"],
             "plant.initial_actuators.elevator = 2: plant.limits.elevator is -0.7 to 0.7 rad",
         ),
-        ("nearest_neighbour", ["start.uav.1.gamma=1.499", "plant.guards.flight_path_angle=1.0"], "start of UAV 1"),
+        ("nearest_neighbour", ["start.uav.1.gamma=1.499", "plant.guards.flight_path_angle=1.0"], GUARDED),
         ("fire_monitoring", ["gains.n_max=0.5"], "of load_factor at t = "),
         ("fire_monitoring", ["gains.bank_max=0.1"], "the law allows -0.1 to 0.1 rad"),
         ("containment", ["graph.edges.0={between=[1,1],weight=1}"], "a UAV cannot be its own neighbour"),
-        ("containment", ["start.z=500"], "-500 m from the estimate's start (gain z_start): at most 100 m can be flown"),
-        ("containment", [*MISSION_AT_500, "gains.z_start=1000"], "-500 m from the estimate's start (gain z_start)"),
+        (
+            "containment",
+            ["start.z=500"],
+            "500 m below where its estimate starts (gain z_start): at most 100 m can be flown",
+        ),
+        (
+            "containment",
+            [*MISSION_AT_500, "gains.z_start=1000"],
+            "500 m below where its estimate starts (gain z_start)",
+        ),
         ("prescribed_performance", ["start.z=500"], "outside of the performance tube"),
         (
             "containment",

@@ -76,7 +76,7 @@ def test_the_page_needs_nothing_but_itself(report: Path) -> None:
 
 def test_the_page_tells_claims_events_links_versions_and_seed(report: Path, demo_run: Run) -> None:
     text = words(report)
-    assert "verdict as it should" in text
+    assert "verdict as it should be" in text
     assert "altitude off its place between the leaders, z - z_d" in text
     assert "8 of 8 claims hold" in text
     assert "altitude tracking of UAV 1 at its fault" in text

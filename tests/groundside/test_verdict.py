@@ -68,7 +68,7 @@ def test_a_flight_without_findings_is_as_it_should_be() -> None:
     found = verdict()
     assert found.word == AS_IT_SHOULD
     assert (found.failures, found.remarks, found.severity) == ([], [], "info")
-    assert found.text == "verdict: as it should"
+    assert found.text == "verdict: as it should be"
 
 
 def test_the_largest_error_is_told_with_uav_and_time_and_judged_in_the_end() -> None:
@@ -177,7 +177,7 @@ def test_every_tracking_error_of_a_scheme_can_be_said(scheme: str) -> None:
 def test_a_replay_ends_with_the_verdict(demo_run: Run) -> None:
     *_, last = snapshots_of(demo_run, rate=0.007)
     assert last.t < demo_run.end
-    assert last.events[-1].text == "verdict: as it should"
+    assert last.events[-1].text == "verdict: as it should be"
 
 
 def test_a_scheme_that_declares_what_is_not_recorded_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,7 +229,7 @@ def test_a_recording_has_columns_of_the_actuators_that_there_are(scenario: str, 
 
 def test_the_demo_went_as_it_should(demo_run: Run) -> None:
     assert demo_run.verdict.word == AS_IT_SHOULD
-    assert demo_run.events[-1]["text"] == "verdict: as it should"
+    assert demo_run.events[-1]["text"] == "verdict: as it should be"
     told = json.loads((demo_run.path / FILE).read_text())
     assert told == json.loads(demo_run.verdict.dumps())
     assert told["verdict"] == AS_IT_SHOULD
