@@ -7,7 +7,7 @@ from typing import Any
 
 from ftcc.airside.scheme import Flight, Problem
 
-__all__ = ["above_leaders_climb", "largest_degree", "stable_in_steps", "starts_within_bound", "weighted"]
+__all__ = ["above_leaders_climb", "bounds_errors", "largest_degree", "stable_in_steps", "weighted"]
 
 
 def largest_degree(flight: Flight) -> float:
@@ -34,7 +34,29 @@ def stable_in_steps(rates: Mapping[str, float], step: float) -> list[Problem]:
     ]
 
 
-def starts_within_bound(gains: Any, flight: Flight) -> list[Problem]:
+def bounds_errors(gains: Any, flight: Flight, steepest: float, lost: float) -> list[Problem]:
+    """Conditions on the bound of the synchronization errors of chapters 7 and 8, and on where these start.
+
+    ``steepest`` is the largest gain phi / (k eps_inf) of the outer loop (1/rad) that was flown with success, ``lost``
+    the least with which control was lost.
+    """
+    problems = []
+    if gains.eps0 < gains.eps_inf:
+        problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
+    phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)
+    steepness = phi * (1.0 / gains.k_lo + 1.0 / gains.k_up) / (2.0 * gains.eps_inf)
+    if steepness > steepest:
+        problems.append(
+            Problem(
+                False,
+                f"phi / (k eps_inf) = {steepness:.1f} 1/rad with the graph's weights: control is held up to "
+                f"{steepest:g}, lost from {lost:g} on; widen eps_inf or lower lambda1, lambda2",
+            )
+        )
+    return problems + _starts_within_bound(gains, flight)
+
+
+def _starts_within_bound(gains: Any, flight: Flight) -> list[Problem]:
     """Warn of UAVs whose synchronization error E = lambda1 e + lambda2 sum_j a_ij (e - e_j) starts beyond its bound."""
     problems = []
     low, high = -gains.k_lo * gains.eps0, gains.k_up * gains.eps0

@@ -37,7 +37,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree, stable_in_steps, starts_within_bound
+from ftcc.airside.conditions import bounds_errors, stable_in_steps
 from ftcc.airside.elements.filters import (
     butterworth,
     robust_exact_differentiator_step,
@@ -251,8 +251,8 @@ SWITCHES = {
 
 _LEAST_AIRSPEED = 3.0
 """Airspeed guard, m/s."""
-_STEEPEST = 42.0
-"""Largest phi / (k eps_inf) at which the law was flown with success in both forms, 1/rad."""
+_STEEPEST, _LOST = 42.0, 58.0
+"""Largest phi / (k eps_inf) that was flown with success in both forms, and the least that was lost, 1/rad."""
 _LARGEST_SIDESLIP = math.radians(80.0)
 """Sideslip guard in the kinematics, rad."""
 _RATE_FILTER = 0.02
@@ -524,25 +524,13 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = []
-    if gains.eps0 < gains.eps_inf:
-        problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
+    problems = bounds_errors(gains, flight, _STEEPEST, _LOST)
     if gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
         problems.append(Problem(False, f"gain substeps = {gains.substeps:g}: odd numbers make the rudder chatter"))
-    phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)
-    steepness = phi * (1.0 / gains.k_lo + 1.0 / gains.k_up) / (2.0 * gains.eps_inf)
-    if steepness > _STEEPEST:
-        problems.append(
-            Problem(
-                False,
-                f"phi / (k eps_inf) = {steepness:.1f} 1/rad with the graph's weights: the funnel is held up to "
-                f"{_STEEPEST:g}, and control is lost from 58 on; widen eps_inf or lower lambda1, lambda2",
-            )
-        )
     degree = max(len(flight.graph.senders(uav)) for uav in flight.graph.uavs)
     if gains.neighbour_filter > 0.0 and degree > MOST_NEIGHBOURS:
         problems.append(Problem(True, f"a UAV hears {degree} neighbours; at most {MOST_NEIGHBOURS} can be filtered"))
-    return problems + starts_within_bound(gains, flight) + _sampled_well(gains, flight.period)
+    return problems + _sampled_well(gains, flight.period)
 
 
 def _sampled_well(gains: Gains, period: float) -> list[Problem]:

@@ -33,7 +33,7 @@ from ftcc.airside.attitude_model import (
     largest_deflections,
     least_deflections,
 )
-from ftcc.airside.conditions import largest_degree, stable_in_steps, starts_within_bound
+from ftcc.airside.conditions import bounds_errors, stable_in_steps
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
@@ -213,8 +213,8 @@ _LEAST_AIRSPEED = 8.0
 """Airspeed guard, m/s: the surfaces' effect is proportional to V^2."""
 _LARGEST_SIDESLIP = math.radians(60.0)
 """Sideslip guard in the kinematics, rad."""
-_STEEPEST = 5.5
-"""Largest gain of the outer loop that the reference has flown, 1/rad: phi / (k eps_inf)."""
+_STEEPEST, _LOST = 5.5, 6.8
+"""Largest phi / (k eps_inf) flown with success behind surfaces of 20 rad/s, and the least that was lost, 1/rad."""
 _FASTEST_OBSERVER = 0.3
 """Largest k9 times the control period, see `_sampled_well`."""
 _DEGREES = math.radians(1.0)
@@ -402,9 +402,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
     """Conditions on the gains that the chapter states, or that the sampled law needs."""
-    problems = []
-    if gains.eps0 < gains.eps_inf:
-        problems.append(Problem(True, f"gain eps0 = {gains.eps0:g} rad: must be at least eps_inf = {gains.eps_inf:g}"))
+    problems = bounds_errors(gains, flight, _STEEPEST, _LOST)
     try:
         flight.graph.require(Assumption.STRONGLY_CONNECTED)
     except GraphError as error:
@@ -412,20 +410,7 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
             Problem(False, f"graph.edges: {error}; sound all the same, as every UAV knows its own reference")
         )
     problems += stable_in_steps({name: getattr(gains, name) for name in ("k1", "k2", "k8", "k9")}, flight.period)
-    if not any(problem.fatal for problem in problems):
-        phi = gains.lambda1 + gains.lambda2 * largest_degree(flight)
-        steepness = phi * (1.0 / gains.k_lo + 1.0 / gains.k_up) / (2.0 * gains.eps_inf)
-        if steepness > _STEEPEST:
-            problems.append(
-                Problem(
-                    False,
-                    f"phi / (k eps_inf) = {steepness:.1f} 1/rad with the graph's weights: behind surfaces of 20 rad/s "
-                    f"control is held up to {_STEEPEST:g}, lost from 6.8 on; widen eps_inf or lower lambda1, lambda2",
-                )
-            )
-        problems += starts_within_bound(gains, flight)
-    problems += _sampled_well(gains, flight.period)
-    return problems
+    return problems + _sampled_well(gains, flight.period)
 
 
 def _sampled_well(gains: Gains, period: float) -> list[Problem]:
