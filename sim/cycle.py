@@ -10,10 +10,10 @@ import math
 from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
-from ftcc.link.compiled import compiled, compiled_within, fields, fill, moved
+from ftcc.link.compiled import compiled, compiled_apart, compiled_within, fields, fill, moved
 from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturbance, fault, gust, hold_speed, stroke
+from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturb, fault, gust, hold_speed, stroke
 from ftcc.sim.plant import actuate as plant_actuate
 from ftcc.sim.sensors import add_noise, encode_state
 from ftcc.sim.wind import AIR, blow, moving_air
@@ -38,8 +38,6 @@ _SLOTS = tuple(SLOT[name] for name in plant.ACTUATORS)
 _CHANNELS = len(plant.DISTURBANCES)
 _MOVES = tuple(name for name, _ in plant.DISTURBANCES[-len(AIR) :]) == AIR
 """Whether the plant flies in air that may move."""
-_OTHERS = _CHANNELS - len(AIR) if _MOVES else _CHANNELS
-"""Disturbances before those that are the air's motion."""
 _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
 
 
@@ -63,6 +61,31 @@ def _stroke(fleet, i, slot, time, step):
     return 0.0, 0.0, 0.0
 
 
+@compiled_apart
+def _move_air(fleet, i, time, out):
+    """Write the motion of the air at vehicle ``i`` into the last of its disturbances ``out``."""
+    for component in range(len(AIR)):
+        out[_CHANNELS - len(AIR) + component] = moving_air(fleet, i, component, time)
+
+
+@compiled_apart
+def _gusts(fleet, i, time):
+    return gust(fleet, i, time)
+
+
+@compiled_apart
+def _blow(fleet, i, step):
+    blow(fleet, i, step)
+
+
+@compiled
+def _disturb(fleet, i, time, out):
+    """Write into ``out`` what disturbs vehicle ``i``, without the gust of (9.33), in the order of ``DISTURBANCES``."""
+    disturb(fleet, i, time, out)
+    if _MOVES and fleet.still[i] == 0:
+        _move_air(fleet, i, time, out)
+
+
 @compiled
 def _step(fleet, i, parameters, time, h):
     """One step of RK4 of ``h`` (s) whose middle is at ``time`` (s)."""
@@ -72,13 +95,11 @@ def _step(fleet, i, parameters, time, h):
     c0, c1, c2 = _stroke(fleet, i, 2, time, h)
     d0, d1, d2 = _stroke(fleet, i, 3, time, h)
     begin, middle, end = _Inputs(a0, b0, c0, d0), _Inputs(a1, b1, c1, d1), _Inputs(a2, b2, c2, d2)
-    for channel in range(_OTHERS):
-        fleet.disturbed[i, channel] = disturbance(fleet, i, channel, time)
-        if channel == _GUST:
-            fleet.disturbed[i, channel] += gust(fleet, i, time)
-    for component in range(_CHANNELS - _OTHERS):
-        fleet.disturbed[i, _OTHERS + component] = moving_air(fleet, i, component, time)
-    d = fields(_Disturbances, fleet.disturbed[i])
+    disturbed = fleet.disturbed[i]
+    _disturb(fleet, i, time, disturbed)
+    if _GUST >= 0 and fleet.gust_deviation[i] > 0.0:
+        disturbed[_GUST] += _gusts(fleet, i, time)
+    d = fields(_Disturbances, disturbed)
     x = fleet.state[i]
     s = fields(_State, x)
     r1 = _rates(s, begin, d, parameters)
@@ -105,8 +126,8 @@ def advance(fleet, i, start_us, period_us, step_us):
     h = step_us / 1e6
     for n in range(period_us // step_us):
         _step(fleet, i, parameters, (start_us + n * step_us + step_us // 2) / 1e6, h)
-        if _MOVES:
-            blow(fleet, i, start_us // step_us + n + 1)
+        if _MOVES and fleet.still[i] == 0:
+            _blow(fleet, i, start_us // step_us + n + 1)
         why = _lost(fields(_State, fleet.state[i]), guards)
         if why > 0:
             return why
@@ -146,10 +167,7 @@ def conditions(fleet, i, time, out):
     count = len(_SLOTS)
     for n, slot in enumerate(_SLOTS):
         out[n], out[count + n], _ = fault(fleet, i, slot, time)
-    for channel in range(_OTHERS):
-        out[2 * count + channel] = disturbance(fleet, i, channel, time)
-    for component in range(_CHANNELS - _OTHERS):
-        out[2 * count + _OTHERS + component] = moving_air(fleet, i, component, time)
+    _disturb(fleet, i, time, out[2 * count :])
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.actuators import THRUST
-from ftcc.link.compiled import compiled, compiled_within, copy
+from ftcc.link.compiled import compiled, compiled_within, copy, fill
 from ftcc.link.happenings import Happenings
 from ftcc.link.philox import GUST, gaussian_pair, philox
 
@@ -32,7 +32,7 @@ __all__ = [
     "Guards",
     "Gust",
     "actuate",
-    "disturbance",
+    "disturb",
     "fault",
     "gust",
     "healthy",
@@ -216,6 +216,8 @@ class Fleet(NamedTuple):
     """(k, 3, 2): the states of its filters."""
     turbulence_seed: NDArray[np.int64]
     """(k,)."""
+    still: NDArray[np.int64]
+    """(k,): 1 where there are neither gusts nor turbulence: the air's motion stays 0."""
     guards: NDArray[np.float64]
     """(k, 4): see `Guards`."""
     airframe: NDArray[np.float64]
@@ -283,16 +285,15 @@ def fault(fleet, i, actuator, time):
 
 
 @compiled
-def disturbance(fleet, i, channel, time):
-    """The sum of the disturbances of a channel of vehicle ``i`` at ``time`` (s)."""
-    total = 0.0
+def disturb(fleet, i, time, out):
+    """Write into ``out`` (d,) what disturbs vehicle ``i`` at ``time`` (s), summed by channel."""
+    fill(out, 0.0)
     for n in range(fleet.disturbances.shape[1]):
         row = fleet.disturbances[i, n]
         since = time - row[0]
-        if since >= 0.0 and time < row[4] and int(row[1]) == channel:
+        if since >= 0.0 and time < row[4]:
             swing = math.sin(row[5] * since + row[6]) if row[5] > 0.0 else 1.0
-            total += row[2] * _onset(since, row[3]) * swing
-    return total
+            out[int(row[1])] += row[2] * _onset(since, row[3]) * swing
 
 
 @compiled

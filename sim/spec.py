@@ -122,6 +122,7 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         gusts=_padded([spec.discrete_gusts for spec in specs], len(DiscreteGust._fields)),
         dryden=np.array([dryden(spec.turbulence) for spec in specs]),
         turbulence=np.array([settled(spec.turbulence, spec.uav) for spec in specs]),
+        still=np.array([int(not spec.discrete_gusts and spec.turbulence == NO_TURBULENCE) for spec in specs], np.int64),
         turbulence_seed=np.array([spec.turbulence.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
         faults=_free(specs, "faults", len(Fault._fields)),

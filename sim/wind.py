@@ -125,8 +125,6 @@ def _drive(state, row, first, second):
 def blow(fleet, i, step):
     """Bring the turbulence of vehicle ``i`` to the beginning of this step, counted from 1, of its plant."""
     rows = fleet.dryden[i]
-    if rows[0, 0] == 0.0 and rows[1, 0] == 0.0 and rows[2, 0] == 0.0:
-        return
     n0, n1, n2, n3, n4, n5 = _normal(fleet.turbulence_seed[i], step, fleet.uav[i])
     _drive(fleet.turbulence[i, 0], rows[0], n0, n1)
     _drive(fleet.turbulence[i, 1], rows[1], n2, n3)

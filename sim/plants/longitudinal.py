@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, compiled_apart
 from ftcc.sim.airframe import Airframe, Deflections, longitudinal_rates
 from ftcc.sim.plant import AIRSPEED, ALPHA, CLIMB, GAMMA, INCIDENCE, NUMBER, THETA, Q, V, X, Y, Z
 from ftcc.sim.trim import Trim, trim
@@ -76,12 +76,10 @@ SERVES = ("longitudinal",)
 START = ("V", "x", "y", "z", "gamma", "theta", "q")
 
 
-@compiled
-def rates(s, u, d, a):
-    """Rates of `State` under the deflections ``u`` and disturbances ``d`` of the airframe ``a``."""
+@compiled_apart
+def _rates_in_wind(s, u, d, a):
+    """As `longitudinal_rates`, where the air moves."""
     ahead = wind_speed(s.z, d.wind, d.gust) + d.wind_along
-    if ahead == 0.0 and d.wind_up == 0.0:
-        return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a)
     vx, vz = s.V * math.cos(s.gamma), s.V * math.sin(s.gamma)
     forward, climb = vx - ahead, vz - d.wind_up
     speed, gamma = math.sqrt(forward * forward + climb * climb), math.atan2(climb, forward)
@@ -98,6 +96,14 @@ def rates(s, u, d, a):
         s.q,
         q_dot,
     )
+
+
+@compiled
+def rates(s, u, d, a):
+    """Rates of `State` under the deflections ``u`` and disturbances ``d`` of the airframe ``a``."""
+    if d.wind == 0.0 and d.gust == 0.0 and d.wind_along == 0.0 and d.wind_up == 0.0:
+        return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a)
+    return _rates_in_wind(s, u, d, a)
 
 
 @compiled
