@@ -24,6 +24,7 @@ __all__ = ["Conversation", "NoAnswerError", "RefusedError", "StationError"]
 
 _COMPONENT = dialect.MAV_COMP_ID_MISSIONPLANNER
 _NAN = math.nan
+_LARGEST = float(np.finfo(np.float32).max)
 _AFTERTHOUGHT = 0.1
 """Wall time for which the reason of a refusal is waited for, s."""
 
@@ -128,14 +129,23 @@ class Conversation:
         ------
         RefusedError
             If the UAV does not take the value; the former one stays in force.
+        StationError
+            If no message can carry it.
         """
         before, kind = self._read(uav, name)
-        integer = kind == dialect.MAV_PARAM_TYPE_INT32
-        if not math.isfinite(value) or (integer and value != int(value)):
-            raise RefusedError(f"UAV {uav}: {name} = {value}: must be {'a whole' if integer else 'a finite'} number")
-        if np.float32(value) == np.float32(before):
+        if kind == dialect.MAV_PARAM_TYPE_INT32:
+            raw = struct.unpack("<f", struct.pack("<i", _as_int32(name, value)))[0]
+
+            def same(one: float) -> bool:
+                return one == value
+        else:
+            raw = _as_float32(name, value)
+
+            def same(one: float) -> bool:
+                return bool(np.float32(one) == raw)
+
+        if same(before):
             return before
-        raw = struct.unpack("<f", struct.pack("<i", int(value)))[0] if integer else value
         message = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, kind)
         self.texts[uav] = []
 
@@ -143,11 +153,12 @@ class Conversation:
             """With the value asked for, or with the former one behind a reason: others answer earlier questions."""
             if heard.get_type() != "PARAM_VALUE" or heard.param_id.upper() != name.upper():
                 return False
-            return bool(self.texts[uav]) or np.float32(_value(heard)) == np.float32(value)
+            return bool(self.texts[uav]) or same(_value(heard))
 
         after = _value(self._ask(uav, [message], answers, f"parameter {name}"))
-        if np.float32(after) != np.float32(value):
-            raise RefusedError(f"UAV {uav}: {name} = {value:g} is refused: {self._reason(uav)}; in force is {after:g}")
+        if not same(after):
+            why = self._reason(uav)
+            raise RefusedError(f"UAV {uav}: {name} = {value:.10g} is refused: {why}; in force is {after:.10g}")
         return after
 
     def parameters(self, uav: int) -> dict[str, float]:
@@ -193,8 +204,11 @@ class Conversation:
             If there is no such UAV or it does not answer.
         RefusedError
             If the answer is not "accepted"; with the reason that the UAV gives.
+        StationError
+            If a parameter is infinite or beyond float32.
         """
-        given = (*parameters, *(_NAN,) * (7 - len(parameters)))
+        carried = [p if math.isnan(p) else _as_float32(f"parameter {n}", p) for n, p in enumerate(parameters, 1)]
+        given = (*carried, *(_NAN,) * (7 - len(parameters)))
         requests = [
             dialect.MAVLink_command_long_message(self.system(uav), AUTOPILOT, command, n, *given)
             for n in range(self._tries)
@@ -252,6 +266,20 @@ class Conversation:
         while not self.texts.get(uav) and time.monotonic() < until:
             self.receive(uav, until)
         return self.texts[uav][-1] if self.texts.get(uav) else "no reason given"
+
+
+def _as_int32(name: str, value: float) -> int:
+    """A whole number that a message can carry."""
+    if not (math.isfinite(value) and value == int(value) and -(2**31) <= value < 2**31):
+        raise StationError(f"{name} = {value:.10g}: must be a whole number from {-(2**31)} to {2**31 - 1}")
+    return int(value)
+
+
+def _as_float32(name: str, value: float) -> float:
+    """A number as a message can carry it: what it rounds to."""
+    if not abs(value) <= _LARGEST:  # also where it is nan
+        raise StationError(f"{name} = {value:.10g}: must be a finite number, at most {_LARGEST:.7g} in size")
+    return float(np.float32(value))
 
 
 def _value(message: Any) -> float:

@@ -23,7 +23,8 @@ from ftcc.groundside.registry import Card, Control, Entry
 from ftcc.groundside.run import Run, RunError
 from ftcc.groundside.snapshot import Event, Pace
 from ftcc.groundside.verdict import FILE, judge
-from ftcc.link.ground import LISTENERS, Address
+from ftcc.link.addresses import Address
+from ftcc.link.ground import LISTENERS
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
 

@@ -164,6 +164,7 @@ class Swarm:
             key=key,
             home=mission.home,
             id_offset=id_offset,
+            epoch_us=time.time_ns() // 1000,
         )
         self.groups = groups
 

@@ -126,9 +126,10 @@ class Station(Conversation):
         """MAV_CMD_INJECT_FAILURE by our names of unit and kind, see `ftcc.link.failures`; the time at which it acts."""
         if unit not in UNITS or kind not in KINDS:
             raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
+        timed = _At(self, uav, at)
         for name, value in sizes.items():
             self.set(uav, f"FAIL_{name.upper()}", value)
-        with _At(self, uav, at):
+        with timed:
             ack = self.command(uav, dialect.MAV_CMD_INJECT_FAILURE, UNITS[unit].code, KINDS[kind], instance)
         return float(ack.result_param2) / 1e3
 
@@ -249,11 +250,28 @@ class _At:
     """Parameter FTCC_AT for as long as a request lasts."""
 
     def __init__(self, station: Station, uav: int, at: float | None) -> None:
-        self._station, self._uav, self._at = station, uav, at
+        self._station, self._uav = station, uav
+        self._ms = 0 if at is None else _milliseconds(at)
 
     def __enter__(self) -> None:
-        self._station.set(self._uav, "FTCC_AT", 0.0 if self._at is None else round(self._at * 1e3))
+        self._station.set(self._uav, "FTCC_AT", self._ms)
 
     def __exit__(self, *_: object) -> None:
-        if self._at is not None:
-            self._station.set(self._uav, "FTCC_AT", 0.0)
+        if self._ms != 0:
+            self._station.set(self._uav, "FTCC_AT", 0)
+
+
+def _milliseconds(at: float) -> int:
+    """A simulated time (s) in whole ms, as MAVLink has it.
+
+    Raises
+    ------
+    StationError
+        If it is no time to come, or has a fraction of a ms.
+    """
+    if not 0.0 <= at * 1e3 < 2**31:
+        raise StationError(f"at = {at:.10g}: must be a simulated time from 0 to {(2**31 - 1) / 1e3} s")
+    ms = round(at * 1e3)
+    if abs(at * 1e3 - ms) > 1e-3:
+        raise StationError(f"at = {at:.10g} s: must be a whole number of ms")
+    return ms

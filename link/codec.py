@@ -5,6 +5,7 @@ The bare dialect class is used (not mavutil): a quarter of the import time and h
 
 from __future__ import annotations
 
+import collections
 import math
 import operator
 from collections.abc import Callable, Collection
@@ -12,12 +13,13 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
 
-from ftcc.link.signing import Signing
+from ftcc.link.signing import Refusal, Signing
 
 __all__ = ["Codec", "dialect"]
 
 _SIGNATURE = 13
 """Bytes of a signature block: link, time stamp (6), signature (6)."""
+_MOST_REFUSALS = 64
 _UNSIGNED = frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT})
 """Messages that are read without a signature."""
 
@@ -29,6 +31,8 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
         super().__init__(None, srcSystem=system, srcComponent=component)
         self.robust_parsing = True
         self.own_signing = signing
+        self.refusal: Refusal | None = None
+        """Why the last signature was not accepted."""
         if signing is not None:
             self.signing.secret_key = signing.key
             self.signing.link_id = signing.link
@@ -39,8 +43,12 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
         """The dialect's own lets a forged time stamp shut a sender out: it keeps the stamp, then checks."""
         assert self.own_signing is not None
         block = msgbuf[-_SIGNATURE:]
-        stream = (block[0], srcSystem, srcComponent)
-        return self.own_signing.genuine(msgbuf) and self.own_signing.fresh(stream, int.from_bytes(block[1:7], "little"))
+        if not self.own_signing.genuine(msgbuf):
+            self.refusal = Refusal("other key", srcSystem, srcComponent)
+        else:
+            stream = (block[0], srcSystem, srcComponent)
+            self.refusal = self.own_signing.admit(stream, int.from_bytes(block[1:7], "little"))
+        return self.refusal is None
 
 
 class Codec:
@@ -66,8 +74,9 @@ class Codec:
         """Pieces of datagrams that were not valid MAVLink."""
         self.not_finite = 0
         """Messages dropped because a float in them was nan or inf."""
-        self.not_signed = 0
-        """Messages dropped because they were not signed, wrongly signed or repeated."""
+        self.not_signed: collections.Counter[str] = collections.Counter()
+        """Messages dropped because of their signature, by `Reason`."""
+        self._refusals: list[Refusal] = []
 
     def pack(self, *messages: Any, sequence: int | None = None) -> bytes:
         """``messages`` as one datagram, numbered from ``sequence`` on, or from where the last one ended.
@@ -95,18 +104,35 @@ class Codec:
     def parse(self, datagram: bytes) -> list[Any]:
         """The messages of a datagram, in order; bad data and non-finite values are dropped and counted."""
         messages: list[Any] = []
-        for message in self._mav.parse_buffer(datagram) or ():
-            if message.get_msgId() < 0:
-                if getattr(message, "reason", "") == "Invalid signature":
-                    self.not_signed += 1
+        try:
+            for message in self._mav.parse_buffer(datagram) or ():
+                if message.get_msgId() < 0:
+                    if getattr(message, "reason", "") == "Invalid signature":
+                        self._refuse(message.data)
+                    else:
+                        self.bad_data += 1
+                elif _finite(message) or message.get_type() in self._lenient:
+                    messages.append(message)
                 else:
-                    self.bad_data += 1
-            elif _finite(message) or message.get_type() in self._lenient:
-                messages.append(message)
-            else:
-                self.not_finite += 1
-        self._forget()
+                    self.not_finite += 1
+        finally:
+            self._forget()
         return messages
+
+    def _refuse(self, frame: bytearray) -> None:
+        second = frame[0] == dialect.PROTOCOL_MARKER_V2
+        refusal = self._mav.refusal
+        if refusal is None or not (second and frame[2] & dialect.MAVLINK_IFLAG_SIGNED):
+            at = 5 if second else 3
+            refusal = Refusal("unsigned", frame[at], frame[at + 1])
+        self.not_signed[refusal.reason] += 1
+        if len(self._refusals) < _MOST_REFUSALS:
+            self._refusals.append(refusal)
+
+    def take_refusals(self) -> list[Refusal]:
+        """What was dropped because of its signature since the last call; of very many the first ones."""
+        refusals, self._refusals = self._refusals, []
+        return refusals
 
     def _forget(self) -> None:
         """Reset the parser: after one forged header it would swallow the next good datagrams."""

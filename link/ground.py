@@ -7,21 +7,22 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+from ftcc.link.addresses import Address, family_of, is_loopback
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.signing import Signing
 
-__all__ = ["LISTENERS", "Address", "GroundSocket", "Peer"]
-
-Address = tuple[str, int]
+__all__ = ["LISTENERS", "GroundSocket", "Peer"]
 
 LISTENERS: tuple[Address, ...] = ((LOOPBACK, 14550), (LOOPBACK, 14540))
 """Where ground stations and offboard programs listen by custom."""
 
-_GUESTS = 8
+_CALLERS = 32
 """Callers that are remembered at a time."""
 _SILENCE = 10.0
 """Wall time after which a caller that says nothing is forgotten, s."""
+_QUIET = 2.5
+"""Wall time after which one makes room for a newcomer, s: it has left out two of its own HEARTBEATs."""
 _REFUSED = 1.5
 """Wall time for which an address counts as deserted after a refused datagram, s: beyond the next HEARTBEAT."""
 _DATAGRAMS_PER_READ = 64
@@ -29,8 +30,14 @@ _LARGEST_DATAGRAM = 4096
 _FULL = 1200
 """Bytes after which a further datagram is begun: no network fragments that."""
 
-_LENIENT = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
-"""Targets in which clients put nan where they ask for nothing."""
+_LENIENT = (
+    "SET_ATTITUDE_TARGET",
+    "SET_POSITION_TARGET_LOCAL_NED",
+    "SET_POSITION_TARGET_GLOBAL_INT",
+    "MISSION_ITEM",
+    "MISSION_ITEM_INT",
+)
+"""Messages in which clients put nan where they ask for nothing."""
 
 
 class Peer:
@@ -40,6 +47,8 @@ class Peer:
         self.address = address
         self.heard = time.monotonic()
         """When it was last heard, wall s (monotonic)."""
+        self.remembered = True
+        """Whether it is spoken to unasked; else it is answered, and no more."""
         self._socket = link
         self._connected = connected
         self._codec = codec
@@ -103,13 +112,14 @@ class GroundSocket:
     ) -> None:
         self._ids = (system, component)
         self._signing = signing
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        family = family_of(LOOPBACK if to is None else to[0])
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self.codec = Codec(system, component, signing, _LENIENT)
         """Reads what comes; its counters say what was dropped."""
         self._peers: dict[Address, Peer] = {}
-        loopback = to is None or to[0].startswith("127.")
-        self._socket.bind((LOOPBACK if loopback else "0.0.0.0", port))
+        here, anywhere = (LOOPBACK, "0.0.0.0") if family == socket.AF_INET else ("::1", "::")
+        self._socket.bind((here if to is None or is_loopback(to[0]) else anywhere, port))
         self._to: Peer | None = None
         if to is not None:
             self._socket.connect(to)
@@ -135,6 +145,8 @@ class GroundSocket:
                 if self._to is not None:
                     self._to.refused()
                 continue
+            except OSError:
+                return  # No way there at present; the next datagram is another matter.
             messages = self.codec.parse(datagram)
             if messages:
                 peer = self._to or self._peer(address)
@@ -143,13 +155,18 @@ class GroundSocket:
                     yield peer, message
 
     def _peer(self, address: Address) -> Peer:
-        """The caller at ``address``; beyond the number that is remembered one is answered, but not remembered."""
+        """The caller at ``address``; where all places are taken by callers that talk it is not remembered."""
         if address in self._peers:
             return self._peers[address]
         self.forget_the_silent()
         caller = Peer(self._socket, address, False, Codec(*self._ids, self._signing))
-        if len(self._peers) < _GUESTS:
-            self._peers[address] = caller
+        if len(self._peers) == _CALLERS:
+            quietest = min(self._peers.values(), key=lambda peer: peer.heard)
+            if time.monotonic() - quietest.heard < _QUIET:
+                caller.remembered = False
+                return caller
+            del self._peers[quietest.address]
+        self._peers[address] = caller
         return caller
 
     def forget_the_silent(self) -> None:

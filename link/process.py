@@ -53,6 +53,8 @@ class Setting:
     """Where the origin of the local frame lies: latitude, longitude (deg), altitude of z = 0 (m)."""
     id_offset: int = 0
     """What UAVs' ids have added towards the ground."""
+    epoch_us: int = 0
+    """Unix time that counts as simulated time 0, us."""
 
     def system(self, uav: int) -> int:
         """MAVLink system id of a UAV towards the ground."""

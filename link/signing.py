@@ -14,8 +14,9 @@ import secrets
 import stat
 import time
 from pathlib import Path
+from typing import Literal, NamedTuple
 
-__all__ = ["KeyFileError", "Signing", "default_key_file", "new_key_file", "read_key"]
+__all__ = ["KeyFileError", "Refusal", "Signing", "default_key_file", "new_key_file", "read_key", "stamps_file"]
 
 _EPOCH = 1_420_070_400
 """2015-01-01 UTC, from which time stamps count in units of 10 us, s since 1970."""
@@ -25,6 +26,33 @@ _TOLERANCE = 60 * _UNITS
 
 Stream = tuple[int, int, int]
 """Link, system and component of a sender."""
+
+Reason = Literal["unsigned", "other key", "repeated", "late"]
+"""Why a message is refused: it bears no signature; not one by our key; one that was heard; one of long ago."""
+
+
+class Refusal(NamedTuple):
+    """A message that was dropped because of its signature."""
+
+    reason: Reason
+    system: int
+    component: int
+    behind: float = 0.0
+    """By how much its time stamp is behind our clock, s."""
+
+    @property
+    def text(self) -> str:
+        """What was wrong with it, for people."""
+        sender = f"{self.system}/{self.component}"
+        match self.reason:
+            case "unsigned":
+                return f"{sender} does not sign: it is not obeyed"
+            case "other key":
+                return f"signed by {sender} with another key"
+            case "late":
+                return f"signed by {sender}, {self.behind:.0f} s behind: its clock?"
+            case "repeated":
+                return f"signed by {sender} before, and sent again: repeated by somebody, or its clock was put back"
 
 
 class KeyFileError(ValueError):
@@ -75,6 +103,11 @@ def read_key(path: Path) -> bytes:
     return hashlib.sha256(lines[0].encode()).digest()
 
 
+def stamps_file(key: Path, system: int, component: int) -> Path:
+    """Where a MAVLink component keeps the stamps of what it heard: beside the key file."""
+    return key.with_name(f"{key.name}.stamps") / f"{system}-{component}.json"
+
+
 def _now() -> int:
     return int((time.time() - _EPOCH) * _UNITS)
 
@@ -89,6 +122,11 @@ class Signing:
         Where stamps are kept, so that a command that was heard before a restart is refused after it.
     link : int
         Which of the links of its system this is, 0..255: stamps rise on each of them.
+
+    Raises
+    ------
+    KeyFileError
+        If the memory cannot be read, or holds no stamps.
     """
 
     def __init__(self, key: bytes, memory: Path | None = None, link: int = 0) -> None:
@@ -109,8 +147,20 @@ class Signing:
                 for name, stamp in kept["heard"].items():
                     link, system, component = map(int, name.split("/"))
                     self._heard[link, system, component] = int(stamp)
+            except FileNotFoundError:
+                raise
+            except OSError as error:
+                raise KeyFileError(f"{memory}: cannot be read: {error.strerror or error}") from None
             except (ValueError, KeyError, AttributeError, TypeError) as error:
                 raise KeyFileError(f"{memory}: holds no time stamps ({error}); remove it to start afresh") from None
+
+    def can_remember(self) -> bool:
+        """Whether stamps can be written down; makes the folder for them where it can."""
+        if self._memory is None:
+            return False
+        with contextlib.suppress(OSError):
+            self._memory.parent.mkdir(parents=True, exist_ok=True)
+        return os.access(self._memory.parent, os.W_OK)
 
     def stamp(self) -> int:
         """Time stamp of the next message sent: the clock, but always later than the last one."""
@@ -122,17 +172,26 @@ class Signing:
         """Whether the last six bytes are the signature of those before them."""
         return hashlib.sha256(self.key + bytes(message[:-6])).digest()[:6] == bytes(message[-6:])
 
-    def fresh(self, stream: Stream, stamp: int) -> bool:
-        """Whether a genuine message is no repetition; from then on it, and what is older, is one."""
-        known = self._heard.get(stream)
-        if stamp <= known if known is not None else stamp + _TOLERANCE < _now():
-            return False
+    def admit(self, stream: Stream, stamp: int) -> Refusal | None:
+        """None where a genuine message is no repetition; from then on it, and what is older, is one."""
+        known, behind = self._heard.get(stream), _now() - stamp
+        if known is None and behind > _TOLERANCE:
+            return Refusal("late", *stream[1:], behind / _UNITS)
+        if known is not None and stamp <= known:
+            # A clock that was put back is told from a repetition by how far it is behind.
+            return Refusal("late" if behind > _TOLERANCE else "repeated", *stream[1:], behind / _UNITS)
         self._heard[stream] = stamp
         self._dirty = True
-        return True
+        return None
 
     def remember(self) -> None:
-        """Write the stamps down; to be called before a command is obeyed, and at the end."""
+        """Write the stamps down; to be called before a command is obeyed, and at the end.
+
+        Raises
+        ------
+        OSError
+            If they cannot be written; they are still remembered for as long as this process lasts.
+        """
         if self._memory is None or not self._dirty:
             return
         heard = {"/".join(map(str, stream)): stamp for stream, stamp in self._heard.items()}

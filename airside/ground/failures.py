@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.ground.commands import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
+from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
 from ftcc.airside.ground.seat import Seat
 from ftcc.airside.link_events import OWN_RADIO
 from ftcc.airside.link_events import inject as inject_link_event
@@ -18,6 +18,7 @@ from ftcc.link.channel import Channel
 from ftcc.link.compiled import fields
 from ftcc.link.failures import AIRFRAME_SIZES, EVERY, LINK_SIZES, Meaning, failure_messages, meaning_of
 from ftcc.link.mavlink import dialect
+from ftcc.link.text import as_seconds
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink
@@ -61,7 +62,7 @@ class Failures:
 
     def later(self, at_us: int) -> str:
         """ " at t = ..." where something does not act at once."""
-        return f" at t = {at_us / 1e6:g} s" if at_us > self._seat.next_us else ""
+        return f" at t = {as_seconds(at_us)} s" if at_us > self._seat.next_us else ""
 
     def inject(self, request: Request) -> Answer | None:
         """Arm a failure; None: the answer comes when the vehicle has given its own."""

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
+import traceback
+from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from ftcc.airside.ground.commands import COMMANDS, READING, Answer, Request
+from ftcc.airside.ground.answers import Answer, Request, whole
+from ftcc.airside.ground.commands import COMMANDS
 from ftcc.airside.ground.failures import Failures
 from ftcc.airside.ground.offboard import Offboard
 from ftcc.airside.ground.parameters import Parameters
-from ftcc.airside.ground.requests import CHANGING, MESSAGES
+from ftcc.airside.ground.requests import MESSAGES
 from ftcc.airside.ground.seat import Seat
+from ftcc.airside.ground.signatures import Signatures
 from ftcc.airside.ground.streams import STREAMS, Schedule, heartbeat, rates_of
+from ftcc.link.gate import LauncherGoneError
 from ftcc.link.ground import GroundSocket, Peer
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, dialect, status_text
-from ftcc.link.signing import Signing, read_key
 
 __all__ = ["GroundLink"]
 
@@ -26,6 +30,9 @@ _HEARTBEAT = 1.0
 """Period of HEARTBEAT, wall s."""
 _REPEAT = 5.0
 """Wall time within which a repeated command is answered as before, s."""
+
+_TURNED_AWAY = 10.0
+"""Least wall time between two complaints that there are too many clients, s."""
 
 _Key = tuple[int, int, int, str]
 
@@ -39,14 +46,12 @@ class GroundLink:
         self.system = setting.system(seat.spec.uav)
         """MAVLink system id."""
         ports = setting.ports[seat.spec.uav]
-        self._signing: Signing | None = None
-        if setting.key is not None:
-            memory = setting.key.with_name(f"{setting.key.name}.stamps") / f"{self.system}-{AUTOPILOT}.json"
-            self._signing = Signing(read_key(setting.key), memory)
+        self.signatures = Signatures(seat, self.system)
+        signing = self.signatures.signing
         station = (LOOPBACK, setting.station)
-        self._station = GroundSocket(self.system, AUTOPILOT, ports.telemetry, station, self._signing)
-        self._callers = GroundSocket(self.system, AUTOPILOT, ports.ground, None, self._signing)
-        listeners = [GroundSocket(self.system, AUTOPILOT, 0, to, self._signing) for to in setting.listeners]
+        self._station = GroundSocket(self.system, AUTOPILOT, ports.telemetry, station, signing)
+        self._callers = GroundSocket(self.system, AUTOPILOT, ports.ground, None, signing)
+        listeners = [GroundSocket(self.system, AUTOPILOT, 0, to, signing) for to in setting.listeners]
         self.sockets = (self._station, self._callers, *listeners)
         """To be listened to."""
         self._rates = rates_of(seat, station=False)
@@ -55,10 +60,14 @@ class GroundLink:
         }
         self._flows = list(self._schedules.items())
         self._last_heartbeat = 0.0
+        self._turned_away = -math.inf
+        """When a caller was told that there is no place for it, wall s (monotonic)."""
         self._answered: dict[_Key, tuple[tuple[float, ...], float, Any]] = {}
         """By sender and command: its parameters, when, and the COMMAND_ACK."""
         self.after_answer: Callable[[], None] | None = None
         """What a command sends behind its COMMAND_ACK."""
+        self.faults: Counter[str] = Counter()
+        """What failed here, and how often: faults of this software, each flown past."""
         self.failures = Failures(self)
         self.offboard = Offboard(self)
         self.parameters = Parameters(seat, self.rate, self._set_rate)
@@ -73,29 +82,57 @@ class GroundLink:
     def report(self, now_us: int) -> None:
         """After a tick: say what acts, and send the telemetry that is due."""
         self.failures.tell_what_acts(now_us)
+        self.offboard.expire(now_us)
         for peer, schedule in self._flows:
             due = schedule.due(now_us)
             if due and peer.there:
-                peer.send(*(STREAMS[n].make(self.seat) for n in due))
+                self._send(peer, due)
+
+    def _send(self, peer: Peer, due: list[int]) -> None:
+        try:
+            peer.send(*(STREAMS[n].make(self.seat) for n in due))
+        except Exception:
+            # One message that cannot be sent must not take the others with it.
+            for n in due:
+                self._survive(f"telemetry {STREAMS[n].name}", partial(self._send_one, peer, n))
+
+    def _send_one(self, peer: Peer, n: int) -> None:
+        peer.send(STREAMS[n].make(self.seat))
+
+    def _survive(self, what: str, do: Callable[[], None]) -> None:
+        """Do something that the ground has asked for; a fault of ours is counted, told once, and flown past."""
+        try:
+            do()
+        except LauncherGoneError:
+            raise
+        except Exception as error:
+            self.faults[what] += 1
+            if self.faults[what] == 1:
+                traceback.print_exc()
+                self.seat.note(f"{what} failed, a fault of this software: {error!r}", "error")
 
     @property
     def next_us(self) -> int:
         """Simulated time before which there is nothing to `report`, unless the ground asks for something."""
-        return min([self.failures.next_us, *(schedule.next_us for _, schedule in self._flows)])
+        return min([self.failures.next_us, self.offboard.next_us, *(schedule.next_us for _, schedule in self._flows)])
 
     @property
     def next_wall(self) -> float:
-        """Wall time (monotonic, s) before which there is nothing either: what has been armed knows no wall clock."""
-        return -math.inf if self.failures.armed else min(schedule.next_wall for _, schedule in self._flows)
+        """Wall time (monotonic, s) before which there is nothing either: what the flight waits for knows none."""
+        if self.failures.armed or self.offboard.running:
+            return -math.inf
+        return min(schedule.next_wall for _, schedule in self._flows)
 
     def attend(self) -> None:
         """Between ticks, also while the swarm is held: HEARTBEAT, and what must not wait for ever."""
-        self.failures.attend()
+        self._survive("answering for the vehicle", self.failures.attend)
         now = time.monotonic()
         if now - self._last_heartbeat < _HEARTBEAT:
             return
         self._last_heartbeat = now
-        self.offboard.attend()
+        self._survive("HEARTBEAT", self._beat)
+
+    def _beat(self) -> None:
         self._callers.forget_the_silent()
         present = [peer for socket in self.sockets for peer in socket.peers]
         self._schedules = {peer: self.schedule(peer) for peer in present}
@@ -148,18 +185,37 @@ class GroundLink:
 
     def listen(self, socket: GroundSocket) -> None:
         """Answer what has come by ``socket``; what is for other systems is left alone."""
+        self._survive("reading", partial(self._listen, socket))
+
+    def _listen(self, socket: GroundSocket) -> None:
         for peer, message in socket.receive():
+            self._welcome(peer)
             kind = message.get_type()
-            handle = MESSAGES.get(kind)
-            if handle is None or message.get_srcSystem() == self.system:
+            taken = MESSAGES.get(kind)
+            sender = message.get_srcSystem(), message.get_srcComponent()
+            # What has our own ids is our own, sent back; another component of our system is a computer on board.
+            if taken is None or sender == (self.system, AUTOPILOT):
                 continue
             system = getattr(message, "target_system", 0)
             component = getattr(message, "target_component", 0)
             if system not in (0, self.system) or component not in (0, AUTOPILOT):
                 continue
-            if self._signing is not None and kind in CHANGING:
-                self._signing.remember()
-            handle(self, peer, message)
+            if taken.changing:
+                self.signatures.remember()
+            self._survive(kind, partial(taken.handle, self, peer, message))
+        self.signatures.tell(socket.codec)
+
+    def _welcome(self, peer: Peer) -> None:
+        """Begin to send telemetry to who is new, or say why not."""
+        if not peer.remembered:
+            now, text = time.monotonic(), "too many clients: answers only, no telemetry"
+            if now - self._turned_away > _TURNED_AWAY:
+                self._turned_away = now
+                self.text(_M.MAV_SEVERITY_WARNING, text, peer)
+                self.seat.note(f"{text} for {peer.address[0]}:{peer.address[1]}", "warning")
+        elif peer not in self._schedules:
+            self.schedule(peer)
+            peer.send(heartbeat(self.seat, self.seat.alive))
 
     def obey(self, request: Request, repeated: bool) -> None:
         """Carry out a command and answer it; a repetition of one that was answered is answered likewise."""
@@ -169,20 +225,20 @@ class GroundLink:
         if repeated and last is not None and same and time.monotonic() - last[1] < _REPEAT:
             request.peer.send(last[2])
             return
-        handle = COMMANDS.get(request.command)
-        if handle is None:
+        command = COMMANDS.get(request.command)
+        if command is None:
             answer: Answer | None = Answer(_M.MAV_RESULT_UNSUPPORTED)
-        elif not self.seat.alive and request.command not in READING:
+        elif not self.seat.alive and not command.reading:
             answer = Answer(_M.MAV_RESULT_DENIED, "this UAV is lost")
         else:
-            answer = handle(self, request)
+            answer = command.handle(self, request)
         if answer is not None:
             self.answer(request, answer)
 
     def answer(self, request: Request, answer: Answer) -> None:
         """COMMAND_ACK; STATUSTEXT where it needs a reason; a line in the log where something happened."""
         ack = _M.MAVLink_command_ack_message(
-            request.command, answer.result, 0, answer.detail, request.system, request.component
+            request.command, answer.result, 0, whole(answer.detail, 32), request.system, request.component
         )
         key = (request.system, request.component, request.command, repr(request.peer.address))
         self._answered[key] = (request.parameters, time.monotonic(), ack)
@@ -197,7 +253,7 @@ class GroundLink:
                 self.seat.note(answer.event, "info", request.who, "accepted")
         elif answer.text:
             self.text(_M.MAV_SEVERITY_WARNING, answer.text, request.peer)
-            if request.command in READING:
+            if COMMANDS[request.command].reading:
                 return
             name = _M.enums["MAV_CMD"][request.command].name.removeprefix("MAV_CMD_")
             outcome = _M.enums["MAV_RESULT"][answer.result].name.removeprefix("MAV_RESULT_").lower()
@@ -205,13 +261,14 @@ class GroundLink:
 
     def dropped(self) -> dict[str, int]:
         """What came and was no message for us, by reason."""
-        names = ("bad_data", "not_finite", "not_signed")
-        return {name: sum(getattr(socket.codec, name) for socket in self.sockets) for name in names}
+        found: Counter[str] = Counter()
+        for socket in self.sockets:
+            found.update(socket.codec.not_signed)
+            found.update(bad_data=socket.codec.bad_data, not_finite=socket.codec.not_finite)
+        return dict(found)
 
     def close(self) -> None:
         """Free the ports."""
-        if self._signing is not None:
-            with contextlib.suppress(OSError):
-                self._signing.remember()
+        self.signatures.remember()
         for socket in self.sockets:
             socket.close()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ftcc.airside.ground.seat import Seat
-from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.ground.streams import SLOWEST, STREAMS
 from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
 from ftcc.link.channel import Channel
@@ -109,7 +109,7 @@ class Parameters:
         if not math.isfinite(value):
             raise RefusedError(f"{parameter.name}: must be a finite number")
         if not parameter.low <= value <= parameter.high:
-            raise RefusedError(f"{parameter.name} {value:g}: {parameter.low:g} to {parameter.high:g}")
+            raise RefusedError(f"{parameter.name} {value:.10g}: {parameter.low:.10g} to {parameter.high:.10g}")
         before = parameter.read()
         if value == before or (not parameter.integer and np.float32(value) == np.float32(before)):
             return False
@@ -137,7 +137,7 @@ def _system(seat: Seat) -> Iterator[Parameter]:
         lambda value: setattr(seat, "patience", value),
         0.0,
         60.0,
-        meaning="wall time without targets after which offboard becomes hold, s, 0: never",
+        meaning="simulated time without targets after which offboard becomes hold, s, 0: never",
     )
     yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
 
@@ -199,9 +199,12 @@ def _fire(seat: Seat) -> Iterator[Parameter]:
 
 def _rates(rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> Iterator[Parameter]:
     def one(n: int, name: str) -> Parameter:
-        return Parameter(
-            f"SR_{name}", lambda: rate_of(n), lambda value: set_rate(n, value), 0.0, 1000.0, meaning="Hz, 0: silent"
-        )
+        def write(value: float) -> None:
+            if 0.0 < value < SLOWEST:
+                raise RefusedError(f"SR_{name} {value:g}: 0, or at least {SLOWEST:g} Hz")
+            set_rate(n, value)
+
+        return Parameter(f"SR_{name}", lambda: rate_of(n), write, 0.0, 1000.0, meaning="Hz, 0: silent")
 
     return (one(n, stream.name) for n, stream in enumerate(STREAMS))
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ftcc.airside.ground.commands import read_request, set_mode
+from ftcc.airside.ground.answers import ACCEPTED, read_request
+from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.ground.parameters import RefusedError
 from ftcc.link.mavlink import dialect
 from ftcc.link.modes import mode_of
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink
     from ftcc.link.ground import Peer
 
-__all__ = ["CHANGING", "MESSAGES"]
+__all__ = ["MESSAGES", "Message"]
 
 _M = dialect
 _FTP_NAK = 129
@@ -60,7 +60,7 @@ def _parameter_set(link: GroundLink, peer: Peer, message: Any) -> None:
         peer.send(link.parameters.message(n))
         return
     if changed:
-        text = f"parameter {name} = {link.parameters.value(n):g} (was {before:g})"
+        text = f"parameter {name} = {link.parameters.value(n):.10g} (was {before:.10g})"
         link.seat.note(text, "info", who, "accepted")
     answer = link.parameters.message(n)
     for other in link.peers:
@@ -78,10 +78,14 @@ def _command(link: GroundLink, peer: Peer, message: Any) -> None:
 def _set_mode(link: GroundLink, peer: Peer, message: Any) -> None:
     """SET_MODE, which nothing answers but the next HEARTBEAT."""
     mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
-    if mode is not None:
-        answer = set_mode(link, mode)
-        if answer.event:
-            link.seat.note(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
+    if mode is None:
+        link.text(_M.MAV_SEVERITY_WARNING, "modes: mission, hold, offboard", peer)
+        return
+    answer = set_mode(link, mode)
+    if answer.result != ACCEPTED:
+        link.text(_M.MAV_SEVERITY_WARNING, answer.text, peer)
+    elif answer.event:
+        link.seat.note(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
 
 
 def _mission_list(link: GroundLink, peer: Peer, message: Any) -> None:
@@ -91,7 +95,7 @@ def _mission_list(link: GroundLink, peer: Peer, message: Any) -> None:
 
 def _mission_answer(result: int) -> Callable[[GroundLink, Peer, Any], None]:
     def handle(link: GroundLink, peer: Peer, message: Any) -> None:
-        kind = message.mission_type
+        kind = getattr(message, "mission_type", _M.MAV_MISSION_TYPE_MISSION)
         peer.send(_M.MAVLink_mission_ack_message(message.get_srcSystem(), message.get_srcComponent(), result, kind))
 
     return handle
@@ -104,8 +108,16 @@ def _mission_upload(link: GroundLink, peer: Peer, message: Any) -> None:
 
 
 def _timesync(link: GroundLink, peer: Peer, message: Any) -> None:
+    """Answered with the simulated time of the last tick, by which all other messages are stamped, too."""
     if message.tc1 == 0:
-        peer.send(_M.MAVLink_timesync_message(time.time_ns(), message.ts1))
+        # An answer of 0 would be a question.
+        peer.send(_M.MAVLink_timesync_message(max(1, link.seat.now_us * 1000), message.ts1))
+
+
+def _ping(link: GroundLink, peer: Peer, message: Any) -> None:
+    if message.target_system == 0:
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        peer.send(_M.MAVLink_ping_message(message.time_usec, message.seq, *sender))
 
 
 def _files(link: GroundLink, peer: Peer, message: Any) -> None:
@@ -128,25 +140,42 @@ def _target(link: GroundLink, peer: Peer, message: Any) -> None:
     link.offboard.take(message)
 
 
-MESSAGES: dict[str, Callable[[Any, Any, Any], None]] = {
-    "COMMAND_LONG": _command,
-    "COMMAND_INT": _command,
-    "PARAM_REQUEST_LIST": _parameter_list,
-    "PARAM_REQUEST_READ": _parameter_read,
-    "PARAM_SET": _parameter_set,
-    "SET_MODE": _set_mode,
-    "MISSION_REQUEST_LIST": _mission_list,
-    "MISSION_REQUEST": _mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE),
-    "MISSION_REQUEST_INT": _mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE),
-    "MISSION_COUNT": _mission_upload,
-    "MISSION_CLEAR_ALL": _mission_answer(_M.MAV_MISSION_ACCEPTED),
-    "TIMESYNC": _timesync,
-    "FILE_TRANSFER_PROTOCOL": _files,
-    "LOG_REQUEST_LIST": _logs,
-    "SET_ATTITUDE_TARGET": _target,
-    "SET_POSITION_TARGET_LOCAL_NED": _target,
-}
-"""What is done with a message; any other is for somebody else."""
+class Message(NamedTuple):
+    """What is done with a message."""
 
-CHANGING = frozenset({"COMMAND_LONG", "COMMAND_INT", "PARAM_SET", "SET_MODE"})
-"""Those that may change the state of the UAV, beside targets, which are out of date in a moment."""
+    handle: Callable[[Any, Any, Any], None]
+    does: str
+    """For people."""
+    changing: bool = False
+    """It may change the state of the UAV, and is no target, which is out of date in a moment."""
+
+
+_NO_MISSION = "MISSION_ACK: the scenario is the mission"
+_TARGET = "offboard: {}; refused with a text where it asks for more"
+
+MESSAGES: dict[str, Message] = {
+    "COMMAND_LONG": Message(_command, "COMMAND_ACK, to who asked", True),
+    "COMMAND_INT": Message(_command, "COMMAND_ACK; INT32_MAX and nan are not given", True),
+    "PARAM_REQUEST_LIST": Message(_parameter_list, "PARAM_VALUE of all parameters"),
+    "PARAM_REQUEST_READ": Message(_parameter_read, "PARAM_VALUE, or PARAM_ERROR"),
+    "PARAM_SET": Message(_parameter_set, "PARAM_VALUE with the value in force", True),
+    "SET_MODE": Message(_set_mode, "the mode in HEARTBEAT, or a text", True),
+    "MISSION_REQUEST_LIST": Message(_mission_list, "MISSION_COUNT 0: the scenario is the mission"),
+    "MISSION_REQUEST": Message(_mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE), _NO_MISSION),
+    "MISSION_REQUEST_INT": Message(_mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE), _NO_MISSION),
+    "MISSION_COUNT": Message(_mission_upload, "MISSION_ACK: unsupported, but for an empty mission"),
+    "MISSION_ITEM": Message(_mission_answer(_M.MAV_MISSION_UNSUPPORTED), _NO_MISSION),
+    "MISSION_ITEM_INT": Message(_mission_answer(_M.MAV_MISSION_UNSUPPORTED), _NO_MISSION),
+    "MISSION_WRITE_PARTIAL_LIST": Message(_mission_answer(_M.MAV_MISSION_UNSUPPORTED), _NO_MISSION),
+    "MISSION_SET_CURRENT": Message(_mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE), _NO_MISSION),
+    "MISSION_REQUEST_PARTIAL_LIST": Message(_mission_answer(_M.MAV_MISSION_INVALID_SEQUENCE), _NO_MISSION),
+    "MISSION_CLEAR_ALL": Message(_mission_answer(_M.MAV_MISSION_ACCEPTED), "MISSION_ACK: it is empty"),
+    "TIMESYNC": Message(_timesync, "TIMESYNC on the simulated clock"),
+    "PING": Message(_ping, "PING, to who asked"),
+    "FILE_TRANSFER_PROTOCOL": Message(_files, "refused: there are no files"),
+    "LOG_REQUEST_LIST": Message(_logs, "LOG_ENTRY: no logs; the run's folder has them"),
+    "SET_ATTITUDE_TARGET": Message(_target, _TARGET.format("an attitude of a follower that refers to one")),
+    "SET_POSITION_TARGET_LOCAL_NED": Message(_target, _TARGET.format("altitude and forward speed of a leader")),
+    "SET_POSITION_TARGET_GLOBAL_INT": Message(_target, _TARGET.format("altitude and forward speed of a leader")),
+}
+"""What is done with a message by its name; any other is for somebody else."""

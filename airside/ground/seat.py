@@ -69,7 +69,7 @@ class Seat:
     at_ms: int = 0
     """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
     patience: float = 1.0
-    """Parameter COM_OF_LOSS_T: wall time without targets after which offboard becomes hold, s; 0 = never."""
+    """Parameter COM_OF_LOSS_T: simulated time without targets after which offboard becomes hold, s; 0 = never."""
     failures_enabled: int = 1
     """Parameter SYS_FAILURE_EN."""
     fault_tolerance: bool = True

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
+from ftcc.airside.ground.answers import whole
 from ftcc.airside.ground.seat import Seat
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
@@ -15,12 +16,24 @@ from ftcc.link.mavlink import dialect, float_array
 from ftcc.link.modes import custom_mode
 from ftcc.link.rotation import body_attitude
 
-__all__ = ["LINK_FIELDS", "ON_REQUEST", "STREAMS", "Schedule", "Stream", "heartbeat", "rates_of", "requested"]
+__all__ = [
+    "LINK_FIELDS",
+    "ON_REQUEST",
+    "SLOWEST",
+    "STREAMS",
+    "Schedule",
+    "Stream",
+    "heartbeat",
+    "rates_of",
+    "requested",
+]
 
 LINK_FIELDS = ("sender", "age", "received", "lost", "cut")
 """Numbers per in-edge in the DEBUG_FLOAT_ARRAY "links"; age -1 = never heard."""
 
 _M = dialect
+SLOWEST = 1e-3
+"""Least rate of a stream that is not silent, Hz."""
 _SLACK = 0.9
 """A message that is due a little early is sent: a tick that comes early must not halve the rate."""
 
@@ -40,7 +53,8 @@ def heartbeat(seat: Seat, alive: bool = True) -> Any:
 
 
 def _stamp(seat: Seat) -> int:
-    return seat.now_us // 1000
+    """time_boot_ms: simulated time; a uint32, it begins anew after 49.7 days."""
+    return seat.now_us // 1000 % 2**32
 
 
 def _attitude(seat: Seat) -> Any:
@@ -59,12 +73,6 @@ def _local_position(seat: Seat) -> Any:
     return _M.MAVLink_local_position_ned_message(_stamp(seat), *seat.message[7:].tolist())
 
 
-def _whole(value: float, bits: int, signed: bool = True) -> int:
-    """The nearest integer that fits."""
-    low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-    return int(max(low, min(high, round(value))))
-
-
 def _heading(seat: Seat) -> float:
     """Degrees, 0..360."""
     return math.degrees(_attitude(seat).yaw) % 360.0
@@ -77,11 +85,11 @@ def _global_position(seat: Seat) -> Any:
         _stamp(seat),
         latitude,
         longitude,
-        _whole((seat.home.altitude - z) * 1e3, 32),
-        _whole(-z * 1e3, 32),
-        _whole(vx * 1e2, 16),
-        _whole(vy * 1e2, 16),
-        _whole(vz * 1e2, 16),
+        whole((seat.home.altitude - z) * 1e3, 32),
+        whole(-z * 1e3, 32),
+        whole(vx * 1e2, 16),
+        whole(vy * 1e2, 16),
+        whole(vz * 1e2, 16),
         int(_heading(seat) * 1e2) % 36000,
     )
 
@@ -95,10 +103,10 @@ def _gps_raw(seat: Seat) -> Any:
         _M.GPS_FIX_TYPE_3D_FIX,
         latitude,
         longitude,
-        _whole((seat.home.altitude - z) * 1e3, 32),
+        whole((seat.home.altitude - z) * 1e3, 32),
         100,
         100,
-        _whole(math.sqrt(vx * vx + vy * vy + vz * vz) * 1e2, 16, signed=False),
+        whole(math.sqrt(vx * vx + vy * vy + vz * vz) * 1e2, 16, signed=False),
         int(course * 1e2) % 36000,
         12,
     )
@@ -107,7 +115,7 @@ def _gps_raw(seat: Seat) -> Any:
 def _vfr_hud(seat: Seat) -> Any:
     _, _, z, vx, vy, vz = seat.message[7:].tolist()
     ground = math.sqrt(vx * vx + vy * vy)
-    throttle = _whole(100.0 * float(seat.controls[THRUST]), 16, signed=False)
+    throttle = whole(100.0 * float(seat.controls[THRUST]), 16, signed=False)
     altitude = seat.home.altitude - z
     # Still air: airspeed is speed.
     airspeed = math.sqrt(ground * ground + vz * vz)
@@ -145,12 +153,13 @@ def _extended_state(seat: Seat) -> Any:
 
 
 def _system_time(seat: Seat) -> Any:
-    return _M.MAVLink_system_time_message(time.time_ns() // 1000, _stamp(seat))
+    """The Unix time of the simulated time: that of the swarm's start, and what has been simulated since."""
+    return _M.MAVLink_system_time_message(seat.setting.epoch_us + seat.now_us, _stamp(seat))
 
 
 def _servos(seat: Seat) -> Any:
-    pulses = [_whole(1500.0 + 500.0 * fraction, 16, signed=False) for fraction in seat.controls.tolist()]
-    pulses[THRUST] = _whole(1000.0 + 1000.0 * float(seat.controls[THRUST]), 16, signed=False)
+    pulses = [whole(1500.0 + 500.0 * fraction, 16, signed=False) for fraction in seat.controls.tolist()]
+    pulses[THRUST] = whole(1000.0 + 1000.0 * float(seat.controls[THRUST]), 16, signed=False)
     return _M.MAVLink_servo_output_raw_message(seat.now_us % 2**32, 0, *pulses, 0, 0, 0, 0)
 
 
@@ -236,7 +245,7 @@ def _links(seat: Seat) -> Any:
 
 def _home_position(seat: Seat) -> Any:
     latitude, longitude = seat.home.place(0.0, 0.0)
-    altitude = _whole(seat.home.altitude * 1e3, 32)
+    altitude = whole(seat.home.altitude * 1e3, 32)
     return _M.MAVLink_home_position_message(
         latitude, longitude, altitude, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, seat.now_us
     )

@@ -87,13 +87,24 @@ _UNIT = 0.01
 """By how much the length of a quaternion may differ from 1."""
 
 
+_RATES = (
+    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE,
+    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE,
+    dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE,
+)
+
+
 def command_from_ground(message: Any, own: NDArray[np.float64], now_us: int) -> tuple[Command | None, str]:
     """What a SET_ATTITUDE_TARGET asks for, by the flight path of ``own``; or None and why it is refused.
 
-    Of rates and thrust no notice is taken: the filter makes the rates, and the laws leave the thrust alone.
+    Of thrust no notice is taken: the laws leave it alone, and no client can leave it out. Rates are refused: the filter
+    makes them.
     """
     if message.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
         return None, "attitude target: without an attitude"
+    rates = zip(_RATES, (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate), strict=True)
+    if any(not message.type_mask & ignored and rate != 0.0 and not math.isnan(rate) for ignored, rate in rates):
+        return None, "attitude target: asks for rates, too"
     q = [float(value) for value in message.q]
     length = math.sqrt(sum(value * value for value in q))
     if not abs(length - 1.0) < _UNIT:  # also where it is not a number

@@ -33,6 +33,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         ground.fault,
         ground.repair,
         ground.failures,
+        ground.commands,
         ground.link,
         ground.ftc,
         ground.leader,

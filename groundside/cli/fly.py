@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast, get_args
 
@@ -27,12 +28,13 @@ from ftcc.groundside.cli.common import (
     new_run_folder,
     show_claims,
     speed_factor,
+    warn,
 )
 
 if TYPE_CHECKING:
     from ftcc.groundside.registry import Entry
     from ftcc.groundside.snapshot import Pace
-    from ftcc.link.ground import Address
+    from ftcc.link.addresses import Address
 
 __all__ = ["doctor", "fly", "ps", "stop"]
 
@@ -60,25 +62,36 @@ def _listeners(given: list[str] | None) -> tuple[Address, ...]:
 
     if given is None:
         return LISTENERS
+    from ftcc.link.addresses import AddressError, resolve
+
     found = []
     for text in given:
-        host, _, port = text.rpartition(":")
         if text == "none":
             continue
-        if not host or not port.isdigit() or not 0 < int(port) < 65536:
-            fail(f"--mavlink {text}: must be HOST:PORT, such as 127.0.0.1:14550, or none")
-        found.append((host, int(port)))
-    return tuple(found)
+        try:
+            found.append(resolve(text))
+        except AddressError as error:
+            fail(f"--mavlink {text}: {error}")
+    return tuple(dict.fromkeys(found))
 
 
-def _check_key(key: Path | None) -> None:
-    from ftcc.link.signing import KeyFileError, read_key
+def _check_key(key: Path | None, systems: Iterable[int]) -> None:
+    """That the key can be used, and what was heard with it read; a warning where nothing new can be kept."""
+    from ftcc.link.mavlink import AUTOPILOT
+    from ftcc.link.signing import KeyFileError, Signing, read_key, stamps_file
 
+    if key is None:
+        return
     try:
-        if key is not None:
-            read_key(key)
+        secret = read_key(key)
+        memories = [Signing(secret, stamps_file(key, system, AUTOPILOT)) for system in systems]
     except KeyFileError as error:
         fail(f"--key {error}")
+    if not all(memory.can_remember() for memory in memories):
+        warn(
+            f"--key {key}: the time stamps of what is heard cannot be kept beside it: "
+            "commands of this flight could be repeated in the next one"
+        )
 
 
 def _check_systems(greatest: int, id_offset: int) -> None:
@@ -132,8 +145,9 @@ def fly(
         fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
     count = _pack(pack, len(mission.vehicles))
     listeners = _listeners(mavlink)
-    _check_key(key)
-    _check_systems(max(spec.uav for spec in mission.vehicles), id_offset)
+    uavs = [spec.uav for spec in mission.vehicles]
+    _check_systems(max(uavs), id_offset)
+    _check_key(key, [uav + id_offset for uav in uavs])
     folder = new_run_folder(mission, out)
 
     from ftcc.groundside.fly import FlightOptions
@@ -142,7 +156,7 @@ def fly(
     from ftcc.link.ports import PortError, reserve
 
     try:
-        ports = reserve([spec.uav for spec in mission.vehicles], port)
+        ports = reserve(uavs, port)
     except PortError as error:
         folder.rmdir()
         fail(str(error))
@@ -192,6 +206,12 @@ def fly(
         except TimeoutError as error:
             console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
             raise typer.Exit(_FLIGHT_FAILED) from error
+    if outcome.died and not outcome.ticks:
+        console.print(
+            f"[bold red]nothing flew: {', '.join(outcome.died)} died at the start[/]; see {folder / 'logs'}",
+            soft_wrap=True,
+        )
+        raise typer.Exit(_FLIGHT_FAILED)
     wall = time.monotonic() - begun
     show_claims(folder)
     share = 100.0 * outcome.late / max(outcome.ticks, 1)

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ftcc.groundside.cli.common import fail, speed_factor, terminal, warn
+from ftcc.link.text import as_seconds
 
 if TYPE_CHECKING:
     from ftcc.groundside.station import Station
 
 __all__ = [
     "attitude",
+    "commands",
     "failures",
     "fault",
     "ftc",
@@ -88,6 +90,26 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
         raise typer.Exit(2)
 
 
+def commands() -> None:
+    """List the MAVLink commands and messages to a UAV, and what it does about each."""
+    from rich.table import Table
+
+    from ftcc.airside.ground import COMMANDS, MESSAGES
+    from ftcc.link.mavlink import dialect
+
+    table = Table("MAV_CMD", "command", "what it does here", box=None)
+    for number, command in sorted(COMMANDS.items()):
+        table.add_row(str(number), dialect.enums["MAV_CMD"][number].name.removeprefix("MAV_CMD_"), command.does)
+    heard = Table("message", "answer", box=None)
+    for name, message in sorted(MESSAGES.items()):
+        heard.add_row(name, message.does)
+    out = terminal()
+    out.print(table)
+    out.print("\nAny other command is answered UNSUPPORTED. Messages:\n", highlight=False)
+    out.print(heard)
+    out.print("\nAny other message is left alone.", highlight=False)
+
+
 def failures() -> None:
     """List everything that can be made to fail, and what MAV_CMD_INJECT_FAILURE means here."""
     from rich.table import Table
@@ -140,7 +162,7 @@ def fault(
             fail(f"--size {setting}: must be FAIL_NAME=NUMBER, see `ftcc failures`")
     with _station(swarm, key) as station:
         when = station.fault(uav, what, kind=kind, at=at, **sizes)
-    _say(f"UAV {uav}: {what} {kind} at t = {when:g} s")
+    _say(f"UAV {uav}: {what} {kind} at t = {as_seconds(round(when * 1e6))} s")
 
 
 def repair(
@@ -323,7 +345,7 @@ def _wait_until_held(name: str | None) -> None:
         except (LookupError, OSError, RuntimeError) as error:
             fail(f"the swarm has ended before it was held ({error})")
         if status["state"] == "held":
-            _say(f"held at t = {status['t']:g} s")
+            _say(f"held at t = {as_seconds(round(status['t'] * 1e6))} s")
             return
         time.sleep(0.02)
     fail(f"not held after {_HOLDING:g} s")

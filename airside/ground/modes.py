@@ -1,0 +1,33 @@
+"""Changes of an autopilot's mode, whoever asks for them: a command, a message, or targets that stop coming."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, Answer
+from ftcc.airside.references.profiles import release_from_ground
+from ftcc.link.modes import MISSION, NAMES, OFFBOARD
+
+if TYPE_CHECKING:
+    from ftcc.airside.ground.link import GroundLink
+
+__all__ = ["set_mode"]
+
+
+def set_mode(link: GroundLink, mode: int) -> Answer:
+    """Change the mode."""
+    seat = link.seat
+    if mode == OFFBOARD:
+        why = link.offboard.refused()
+        if why:
+            return Answer(DENIED, why)
+        if not link.offboard.fresh():
+            return Answer(BUSY, link.offboard.refused_target or "offboard: send targets first")
+        link.offboard.enter()
+    if mode == MISSION and seat.leader:
+        release_from_ground(seat.autopilots.profile_commands[seat.i])
+    if mode == MISSION:
+        link.offboard.release()
+    before = int(seat.autopilots.mode[seat.i])
+    seat.autopilots.mode[seat.i] = mode
+    return Answer(ACCEPTED, event="" if before == mode else f"mode {NAMES[mode]}")
