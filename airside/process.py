@@ -79,9 +79,12 @@ class Crew:
         self.recorder = Recorder(
             [part_path(setting.folder, s.uav, "autopilot") if s.role == "follower" else None for s in specs],
             columns(specs[0].scheme),
+            on_trouble=self.report_trouble,
         )
         self.link_recorder = Recorder(
-            [part_path(setting.folder, s.uav, "links") if s.neighbours else None for s in specs], LINK_COLUMNS
+            [part_path(setting.folder, s.uav, "links") if s.neighbours else None for s in specs],
+            LINK_COLUMNS,
+            on_trouble=self.report_trouble,
         )
         self.group = build_group(specs, self.timing, self.recorder.rows, self.link_recorder.rows)
         load_compiled(self.group, self.timing, self.flight)
@@ -103,6 +106,10 @@ class Crew:
         connect(self.group.wire, self.vehicles, self.waiter.fileno(), mesh)
         self.stall = Stall()
         self._fly = entry_of(self.flight.fly, self.group, self.timing, setting.lockstep)
+
+    def report_trouble(self, text: str) -> None:
+        """Tell that something cannot be recorded."""
+        self.gate.tell(Said("error", text))
 
     def seat(self, i: int) -> Seat:
         """What the ground may see and touch of autopilot ``i``."""

@@ -90,9 +90,15 @@ class _Flight:
         """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
         stamped = event if event.t >= 0.0 else replace(event, t=self.station.t)
         more = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
-        self.log.write(stamped.t, stamped.text, stamped.uav, stamped.severity, **more)
+        self._write(stamped, more)
         self.station.note(stamped)
         self.say(stamped)
+
+    def _write(self, event: Event, more: dict[str, str]) -> None:
+        fine = not self.log.trouble
+        self.log.write(event.t, event.text, event.uav, event.severity, **more)
+        if fine and self.log.trouble:
+            self.note(Event(event.t, "error", f"events are not logged any further: {self.log.trouble}"))
 
     def scheduled_events(self) -> None:
         """Note the scenario's own events as their time comes."""

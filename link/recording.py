@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -164,11 +164,18 @@ class Recorder:
     paths : the file of each UAV; None: nothing is recorded of it.
     columns : of all of them.
     places : where each column stands in a row, ascending, the last one at its end; by default one after the other.
+    on_trouble : called with the reason where a part cannot be written any further: it ends there, the flight goes on.
     """
 
     def __init__(
-        self, paths: Sequence[Path | None], columns: Sequence[Column], places: Sequence[int] | None = None
+        self,
+        paths: Sequence[Path | None],
+        columns: Sequence[Column],
+        places: Sequence[int] | None = None,
+        *,
+        on_trouble: Callable[[str], None],
     ) -> None:
+        self._on_trouble = on_trouble
         self._places = list(range(len(columns)) if places is None else places)
         self.rows = new_rows(len(paths), self._places[-1] + 1)
         self._parts = {i: PartWriter(path, columns) for i, path in enumerate(paths) if path is not None}
@@ -177,9 +184,17 @@ class Recorder:
     def write(self) -> None:
         """Write all rows that have been filled."""
         self._written = time.monotonic()
-        for i, part in self._parts.items():
-            part.write(self.rows.values[i, : self.rows.filled[i]][:, self._places])
+        for i, part in tuple(self._parts.items()):
+            try:
+                part.write(self.rows.values[i, : self.rows.filled[i]][:, self._places])
+            except OSError as error:
+                self._give_up(i, error)
         self.rows.filled[:] = 0
+
+    def _give_up(self, i: int, error: OSError) -> None:
+        """What is written of a part stays; readers stop at the last batch that is whole."""
+        path = self._parts.pop(i).path
+        self._on_trouble(f"{path.name} is not written any further: {error.strerror or error}")
 
     def write_if_due(self) -> None:
         """Write what has waited for about a second of wall time.
@@ -193,8 +208,11 @@ class Recorder:
     def close(self) -> None:
         """Write the rest and end the files."""
         self.write()
-        for part in self._parts.values():
-            part.close()
+        for i, part in tuple(self._parts.items()):
+            try:
+                part.close()
+            except OSError as error:
+                self._give_up(i, error)
 
 
 def read_part(path: Path) -> Any:
@@ -220,6 +238,9 @@ def read_part(path: Path) -> Any:
 class EventLog:
     """Appends events to a file, a JSON object a line, each written through at once."""
 
+    trouble = ""
+    """Why events could not be written; empty where all were."""
+
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -229,11 +250,17 @@ class EventLog:
         """Append an event at simulated time ``t`` (s); ``severity`` is "info", "warning" or "error"."""
         event = {"schema": SCHEMA_VERSION, "t": t, "uav": uav, "severity": severity, "text": text}
         event |= {"wall": round(time.time(), 3), **more}
-        self._file.write(json.dumps(event) + "\n")
+        try:
+            self._file.write(json.dumps(event) + "\n")
+        except OSError as error:
+            self.trouble = error.strerror or str(error)
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        try:
+            self._file.close()
+        except OSError as error:
+            self.trouble = error.strerror or str(error)
 
 
 def read_events(path: Path) -> list[dict[str, Any]]:

@@ -109,6 +109,7 @@ class Vehicles:
             [part_path(setting.folder, spec.uav, "vehicle") for spec in specs],
             columns(plant, obstacles),
             places(plant, obstacles),
+            on_trouble=lambda text: gate.tell(Said("error", text)),
         )
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)

@@ -56,7 +56,7 @@ def test_a_part_whose_writer_was_killed_is_whole_up_to_its_last_batch(tmp_path: 
 
 def test_a_recorder_writes_the_rows_that_each_uav_has_filled(tmp_path: Path) -> None:
     paths = [part_path(tmp_path, uav, "vehicle") for uav in (1, 2)]
-    recorder = Recorder([paths[0], None, paths[1]], COLUMNS)
+    recorder = Recorder([paths[0], None, paths[1]], COLUMNS, on_trouble=pytest.fail)
     rows = recorder.rows
     for k in range(ROWS):
         assert not is_full(rows)
@@ -74,6 +74,29 @@ def test_a_recorder_writes_the_rows_that_each_uav_has_filled(tmp_path: Path) -> 
     recorder.close()
     assert read_part(paths[0]).column("z").to_pylist() == [*map(float, range(ROWS)), 7.0]
     assert read_part(paths[1]).column("z").to_pylist() == [-1.0]
+
+
+def test_where_the_disk_is_full_a_part_ends_and_the_others_go_on(tmp_path: Path) -> None:
+    paths = [tmp_path / "1-vehicle.arrows", tmp_path / "2-vehicle.arrows"]
+    paths[1].symlink_to("/dev/full")
+    told: list[str] = []
+    recorder = Recorder(paths, COLUMNS, on_trouble=told.append)
+    for _ in range(2):
+        recorder.rows.values[:, 0] = (0.0, 1, 3.0)
+        recorder.rows.filled[:] = 1
+        recorder.write()
+    recorder.close()
+    assert read_part(paths[0]).column("z").to_pylist() == [3.0, 3.0]
+    assert told == ["2-vehicle.arrows is not written any further: No space left on device"]
+
+
+def test_a_log_of_events_on_a_full_disk_says_so_and_raises_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "events.jsonl"
+    path.symlink_to("/dev/full")
+    log = EventLog(path)
+    log.write(1.0, "elevator fault", 1, "warning")
+    assert log.trouble == "No space left on device"
+    log.close()
 
 
 def test_a_part_without_a_schema_is_no_part(tmp_path: Path) -> None:
