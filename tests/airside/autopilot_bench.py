@@ -1,10 +1,11 @@
-"""A real autopilot process's crew for UAV 1, alone, with a test in the place of its vehicle."""
+"""A real autopilot process's crew for one UAV, alone, with a test in the place of its vehicle."""
 
 from __future__ import annotations
 
 import threading
 from multiprocessing import Pipe
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
 from ftcc.link.wire import STATE
-from tests.pymavlink_wire import read_command, state_messages
-from tests.swarm import GRAPH, autopilot, timing
+from tests.pymavlink_wire import read_command, read_target, state_messages
+from tests.swarm import GRAPH, LEADERS, autopilot, timing
 
 FLIGHT = Flight(GRAPH, 0.01, 0.05, 0.05, 2.0, False)
 """What the law's conditions are checked against."""
@@ -40,21 +41,23 @@ class Bench:
         ticks: int,
         lockstep: bool = True,
         neighbours: tuple[int, ...] = (),
-        key: Path | None = None,
+        uav: int = 1,
+        **setting: Any,
     ) -> None:
-        uavs = (1, *neighbours)
+        self.uav = uav
+        uavs = (uav, *neighbours)
         self.block = reserve(uavs)
-        ports = self.block.of(1)
+        ports = self.block.of(uav)
         self.timing = timing("flight", ticks / 100)
         every = {uav: self.block.of(uav) for uav in uavs}
         alone = {uav: uav for uav in uavs}
-        setting = Setting("test", self.timing, lockstep, every, alone, self.block.station, folder, key=key)
+        shared = Setting("test", self.timing, lockstep, every, alone, self.block.station, folder, **setting)
         self.launcher, pipe = Pipe()
-        self.vehicle = Endpoint(1, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
+        self.vehicle = Endpoint(uav, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
         self.station = Endpoint(STATION, 1, self.block.station)
-        spec = autopilot(1, neighbours=tuple(Neighbour(uav, 0.5) for uav in neighbours), flight=FLIGHT)
+        spec = autopilot(uav, neighbours=tuple(Neighbour(other, 0.5) for other in neighbours), flight=FLIGHT)
         # Nobody waits for neighbours that are not there.
-        self.crew = Crew([spec], setting, Gate(pipe, gone=set(neighbours)))
+        self.crew = Crew([spec], shared, Gate(pipe, gone=set(neighbours)))
         self._thread = threading.Thread(target=self.crew.fly)
 
     def __enter__(self) -> Bench:
@@ -76,16 +79,16 @@ class Bench:
         self.block.release()
 
     def answer(self, tick: int, state: np.ndarray, controls: np.ndarray, *more: object) -> np.ndarray:
-        """The command (fractions of travel) that answers a state."""
+        """The command (fractions of travel), or a leader's target, that answers a state."""
         stamp = tick * self.timing.period_us
-        command = np.zeros(4)
+        command, read = (np.zeros(7), read_target) if self.uav in LEADERS else (np.zeros(4), read_command)
         for _ in range(100):
             if more:
                 self.vehicle.send(*more)
             self.vehicle.send(*state_messages(stamp, state, controls))
             for _ in range(200):
                 for message in self.vehicle.receive():
-                    if read_command(message, command) == stamp:
+                    if read(message, command) == stamp:
                         return command
                 threading.Event().wait(0.0005)
         raise AssertionError(f"no answer to the state of tick {tick}")

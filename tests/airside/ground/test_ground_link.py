@@ -6,9 +6,7 @@ import math
 import select
 import socket
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from pathlib import Path
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -21,56 +19,13 @@ from ftcc.airside.schemes import find
 from ftcc.groundside.conversation import NoAnswerError, RefusedError
 from ftcc.groundside.registry import Card, Entry
 from ftcc.groundside.station import Station
-from ftcc.link.codec import Codec, dialect
+from ftcc.link.codec import Codec
 from ftcc.link.failures import failure_answer, read_failure
-from ftcc.link.gate import Said
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.modes import HOLD, MISSION
-from tests.airside.autopilot_bench import Bench, forged
+from tests.airside.autopilot_bench import Bench
+from tests.airside.ground.in_flight import LEVEL, M, ask, flying, said
 from tests.pymavlink_wire import state_messages
-
-LEVEL = forged(1000.0, 30.0, 0.0, 0.0322, 0.0)
-M = dialect
-
-
-@contextmanager
-def flying(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **setting: Any) -> Iterator[tuple[Bench, Station]]:
-    """UAV 1 after its first tick, its vehicle played by the test, and a station that speaks with it."""
-    monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path / "runtime"))
-    with closing(Bench(tmp_path, 1000, neighbours=(2, 6), **setting)) as alone, alone as bench:
-        bench.answer(0, LEVEL, np.zeros(4))
-        card = Card(1, 1, "follower", bench.block.of(1).ground, (2, 6))
-        entry = Entry("bench", 1, "containment", str(tmp_path), (card,), None, (0, 0), None, 0.0)
-        key = setting.get("key")
-        with Station(entry, timeout=0.3, tries=2, key=key) as station:
-            yield bench, station
-
-
-@pytest.fixture
-def both(tmp_path, monkeypatch) -> Iterator[tuple[Bench, Station]]:
-    with flying(tmp_path, monkeypatch) as pair:
-        yield pair
-
-
-@pytest.fixture
-def station(both) -> Station:
-    return both[1]
-
-
-@pytest.fixture
-def bench(both) -> Bench:
-    return both[0]
-
-
-def said(bench: Bench) -> list[Said]:
-    """What the autopilot has had logged."""
-    found = []
-    while bench.launcher.poll(0.05):
-        message = bench.launcher.recv()
-        if isinstance(message, Said):
-            found.append(message)
-    return found
-
 
 # Questions.
 
@@ -82,10 +37,6 @@ def said(bench: Bench) -> list[Said]:
 )
 def test_every_message_that_it_sends_can_be_asked_for(station, message):
     assert station.request(1, message).get_srcSystem() == 1
-
-
-def ask(station: Station, question: Any, answer: str) -> Any:
-    return station._ask(1, [question], lambda message: message.get_type() == answer, answer)
 
 
 def test_what_a_ground_station_asks_at_connection_is_answered(station):
