@@ -52,7 +52,7 @@ class Refusal(NamedTuple):
             case "late":
                 return f"signed by {sender}, {self.behind:.0f} s behind: its clock?"
             case "repeated":
-                return f"signed by {sender} before, and sent again: repeated by somebody, or its clock was put back"
+                return f"signed by {sender} before and sent again, or its clock was put back"
 
 
 class KeyFileError(ValueError):

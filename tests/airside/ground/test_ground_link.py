@@ -24,7 +24,7 @@ from ftcc.link.failures import failure_answer, read_failure
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.modes import HOLD, MISSION
 from tests.airside.autopilot_bench import Bench
-from tests.airside.ground.in_flight import LEVEL, M, ask, flying, said
+from tests.airside.ground.in_flight import LEVEL, M, ask, said
 from tests.pymavlink_wire import state_messages
 
 # Questions.
@@ -308,27 +308,6 @@ def test_modes_that_mean_nothing_here_are_denied(station, pair):
 
 
 # Signed and hostile.
-
-
-def test_signed_links_obey_who_has_the_key_and_nobody_else(tmp_path, monkeypatch):
-    key = tmp_path / "key"
-    key.write_text("correct horse battery\n")
-    key.chmod(0o600)
-    with flying(tmp_path, monkeypatch, key=key) as (bench, station):
-        assert station.set(1, "K11", 3.5) == 3.5
-        unsigned = Codec(254, 190)
-        with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as stranger:
-            message = M.MAVLink_param_set_message(1, 1, b"K11", 9.0, M.MAV_PARAM_TYPE_REAL32)
-            stranger.sendto(unsigned.pack(message), (LOOPBACK, bench.block.of(1).ground))
-            assert station.get(1, "K11") == 3.5
-        replayed = station._codec.pack(M.MAVLink_param_set_message(1, 1, b"K11", 4.0, M.MAV_PARAM_TYPE_REAL32))
-        port = (LOOPBACK, bench.block.of(1).ground)
-        station._socket.sendto(replayed, port)
-        assert station.get(1, "K11") == 4.0
-        assert station.set(1, "K11", 3.0) == 3.0
-        station._socket.sendto(replayed, port)
-        assert station.get(1, "K11") == 3.0
-        assert bench.crew.ground[0].dropped()["unsigned"] == 1
 
 
 def test_a_state_is_answered_whatever_strangers_send(bench, station):
