@@ -29,9 +29,9 @@ def runtime(environment: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("FTCC_RUNTIME_DIR", environment["FTCC_RUNTIME_DIR"])
 
 
-def held(fly: Callable[..., Flight], *arguments: str, scenario: str = "containment") -> Flight:
+def held(fly: Callable[..., Flight], *arguments: str, scenario: str = "containment", name: str = "run") -> Flight:
     """A swarm in lockstep before its first tick."""
-    flight = fly(scenario, "--speed", "max", "--hold", "--pack", "3", "--mavlink", "none", *arguments)
+    flight = fly(scenario, "--speed", "max", "--hold", "--pack", "3", "--mavlink", "none", *arguments, name=name)
     flight.wait_until(lambda: "held at t = 0" in flight.output)
     return flight
 
@@ -132,15 +132,30 @@ def test_modes_pause_and_steps_in_one_flight(fly: Callable[..., Flight], ftcc: F
     assert modes == [(3, "mode hold"), (7, "mode hold"), (3, "mode mission"), (7, "mode mission"), (8, "mode offboard")]
 
 
-def test_offboard_without_targets_becomes_hold(fly: Callable[..., Flight]) -> None:
-    flight = held(fly, "--duration", "5")
-    with Station() as station:
-        send = dialect.MAVLink_set_position_target_local_ned_message
-        target = send(0, 8, 1, dialect.MAV_FRAME_LOCAL_NED, 0b1111_1111_1011, 0, 0, -1020.0, *(0.0,) * 8)
-        station.send(8, target)
-        station.mode(8, "offboard")
-        flight.wait_until(lambda: "offboard becomes hold" in flight.output, 10.0)
-        assert station.state(8).mode == "hold"
+def test_offboard_without_targets_becomes_hold_in_simulated_time_with_a_pause_or_without(
+    fly: Callable[..., Flight], ftcc: Ftcc
+) -> None:
+    """A pause as long as the time-out is no part of the flight: both are the same, bit for bit."""
+    send = dialect.MAVLink_set_position_target_local_ned_message
+    target = send(0, 8, 1, dialect.MAV_FRAME_LOCAL_NED, 0b1111_1111_1011, 0, 0, -1020.0, *(0.0,) * 8)
+    folders = []
+    for name in ("straight", "paused"):
+        flight = held(fly, "--duration", "4", name=name)
+        with Station() as station:
+            station.set(8, "COM_OF_LOSS_T", 2.0)
+            station.send(8, target)
+            station.mode(8, "offboard")
+            station.send(8, target)
+            if name == "paused":
+                assert ftcc("step", "101").returncode == 0
+                time.sleep(2.5)
+                assert station.state(8).mode == "offboard"
+        assert ftcc("resume").returncode == 0
+        assert flight.wait() == 0, flight.output
+        lost = [event["t"] for event in events(flight.folder) if "becomes hold" in str(event["text"])]
+        assert lost == [2.0]
+        folders.append(flight.folder)
+    assert same_flight(*folders)
 
 
 def strangers(ports: list[int], count: int, per_second: float) -> int:
@@ -249,6 +264,24 @@ def test_two_swarms_have_systems_of_their_own_at_one_ground_station(fly: Callabl
         assert station.state(8).role == "leader"
     with Station("first") as station:
         assert station.get(1, "FAIL_EFF") != pytest.approx(0.9)
+
+
+def test_with_a_key_whose_folder_takes_no_stamps_it_says_so_and_flies(
+    fly: Callable[..., Flight], ftcc: Ftcc, tmp_path: Path
+) -> None:
+    key = tmp_path / "key"
+    assert ftcc("keys", "new", str(key)).returncode == 0
+    (tmp_path / "key.stamps").mkdir()
+    stamps = tmp_path / "key.stamps"
+    stamps.rmdir()
+    stamps.symlink_to("/proc/self")
+    flight = held(fly, "--duration", "2", "--key", str(key))
+    assert "cannot be kept" in flight.output
+    listed = ftcc("vehicles")
+    assert listed.returncode == 0, listed.stderr
+    assert listed.stdout.count("mission") == 8
+    assert ftcc("resume").returncode == 0
+    assert flight.wait() == 0, flight.output
 
 
 def test_systems_of_ground_stations_are_not_taken(ftcc: Ftcc) -> None:

@@ -1,12 +1,15 @@
-"""A launcher that is ended while its processes start leaves none of them, and does not wait for them."""
+"""A start that fails: nothing is left running, nothing is waited for, and nothing is said to have flown."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import psutil
+
+from tests.sitl.conftest import Flight
 
 INTERRUPTED = """
 import sys
@@ -42,3 +45,14 @@ def test_ctrl_c_while_processes_start_ends_the_launcher_and_those_that_run(
     assert ended.returncode != 0, ended.stdout + ended.stderr
     (process,) = [int(line.split()[1]) for line in ended.stdout.splitlines() if line.startswith("process ")]
     assert not psutil.pid_exists(process)
+
+
+def test_a_flight_whose_processes_died_before_it_has_not_flown(fly: Callable[..., Flight]) -> None:
+    flight = fly("containment", "--hold", "--pack", "8", "--mavlink", "none", "--duration", "1")
+    flight.wait_until(lambda: "held at t = 0" in flight.output)
+    for name in ("uav1-8-vehicle", "uav1-8-autopilot"):
+        flight.child(name).kill()
+    assert flight.wait(30.0) == 1
+    assert "process uav1-8-vehicle died (killed by signal 9)" in flight.output
+    assert "nothing flew" in flight.output
+    assert "flew 0.0 s" not in flight.output
