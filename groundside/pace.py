@@ -233,6 +233,8 @@ class PaceMeter:
     ) -> Pace:
         """The pace over the last 5 s of wall time; its factor is nan until half a second has been seen.
 
+        Slower than real time it takes two simulated seconds: the telemetry tells of time in steps of 0.1 s.
+
         Parameters
         ----------
         wall, t : the present instant, monotonic and simulated, s.
@@ -240,11 +242,13 @@ class PaceMeter:
         viewers : pids of the dashboard's viewer, if this flight has started one.
         own : pid of the ground station.
         """
+        asked = self.setup.asked
+        slow = 2.0 / asked if asked is not None and asked < 1.0 else 0.0
         self._samples.append(self.sample(wall, t, processes, viewers, own))
-        while len(self._samples) > 2 and self._samples[1].wall <= wall - _WINDOW:
+        while len(self._samples) > 2 and self._samples[1].wall <= wall - max(_WINDOW, slow):
             self._samples.popleft()
         earliest, latest = self._samples[0], self._samples[-1]
-        if latest.wall - earliest.wall < _SHORTEST:
+        if latest.wall - earliest.wall < max(_SHORTEST, slow):
             return Pace(math.nan, self.setup.asked)
         return judge(earliest, latest, self.setup)
 

@@ -64,7 +64,7 @@ class Parameters:
     def __init__(self, seat: Seat, rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> None:
         self._seat = seat
         seat.sizes.update({size.name: size.default for size in SIZES if size.name not in seat.sizes})
-        own = [*_system(seat), *_sizes(seat), *_channel(seat), *_fire(seat), *_rates(rate_of, set_rate), *_gains(seat)]
+        own = [*_system(seat), *_set_up(), *_sizes(seat), *_channel(seat), *_fire(seat), *_rates(rate_of, set_rate), *_gains(seat)]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
 
@@ -140,6 +140,27 @@ def _system(seat: Seat) -> Iterator[Parameter]:
         meaning="simulated time without targets after which offboard becomes hold, s, 0: never",
     )
     yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
+
+
+_SET_UP = {
+    "SYS_AUTOSTART": (2100.0, "an airframe is chosen: PX4's number of a plain aeroplane"),
+    "COM_RC_IN_MODE": (1.0, "there is no radio control"),
+    "CAL_GYRO0_ID": (1.0, "the gyroscopes are calibrated"),
+    "CAL_ACC0_ID": (1.0, "the accelerometers are"),
+    "CAL_MAG0_ID": (1.0, "the compass is"),
+    "CBRK_AIRSPD_CHK": (162128.0, "the airspeed sensor needs no check"),
+}
+"""What a ground station of PX4 wants to know before it calls an aircraft set up; nothing here can be changed."""
+
+
+def _set_up() -> Iterator[Parameter]:
+    def fixed(name: str, value: float, meaning: str) -> Parameter:
+        def write(_: float) -> None:
+            raise RefusedError(f"{name}: nothing to set up here")
+
+        return Parameter(name, lambda: value, write, value, value, True, meaning)
+
+    return (fixed(name, *rest) for name, rest in _SET_UP.items())
 
 
 def _sizes(seat: Seat) -> Iterator[Parameter]:

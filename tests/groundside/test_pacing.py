@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -58,3 +59,11 @@ def test_after_a_pause_nothing_of_before_counts() -> None:
     pacing.restart()
     assert pacing.pace.factor != pacing.pace.factor, "nan: not known"
     assert said(pacing, 4, 0.4) == []
+
+
+def test_the_steps_in_which_time_is_told_do_not_look_like_a_slow_computer() -> None:
+    """A twentieth of real time: news of 0.1 s come every two seconds, with a delay."""
+    pacing = Pacing(replace(SETUP, asked=0.05), lockstep=True)
+    texts = [pacing.look(100.0 + n, 0.1 * ((n - 1) // 2), (0, 80), OWN, []) for n in range(1, 90)]
+    assert [text for text in texts if text] == []
+    assert pacing.pace.factor == pytest.approx(0.05, rel=0.1)

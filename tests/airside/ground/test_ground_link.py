@@ -104,6 +104,7 @@ def test_all_parameters_are_listed_gains_and_sizes_among_them(station):
     assert values["FAIL_EFF"] == 0.5
     assert values["SYS_FAILURE_EN"] == 1
     assert values["CH_LOSS"] == 0.0
+    assert {"SYS_AUTOSTART", "COM_RC_IN_MODE", "CAL_GYRO0_ID", "CAL_ACC0_ID", "CAL_MAG0_ID"} <= set(values)
     assert all(len(name) <= 16 for name in values)
 
 
@@ -122,6 +123,7 @@ def test_a_value_that_was_typed_is_the_value_in_force(bench, station):
         ("CH_LOSS", 1.5, "0 to 1"),
         ("CH_DELAY", 3.0, "exchange periods"),
         ("SYS_FAILURE_EN", 2, "0 to 1"),
+        ("SYS_AUTOSTART", 4001, "2100 to 2100"),
     ],
 )
 def test_a_refused_value_leaves_the_one_in_force(bench, station, name, value, why):
