@@ -20,7 +20,7 @@ from ftcc.link.codec import Codec
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, NAME_LENGTH, STATION, as_typed, dialect
 from ftcc.link.signing import KeyFileError, Signing, read_key
 
-__all__ = ["Conversation", "NoAnswerError", "RefusedError", "StationError"]
+__all__ = ["Conversation", "NoAnswerError", "RefusedError", "StationError", "as_float32"]
 
 _COMPONENT = dialect.MAV_COMP_ID_MISSIONPLANNER
 _NAN = math.nan
@@ -139,7 +139,7 @@ class Conversation:
             def same(one: float) -> bool:
                 return one == value
         else:
-            raw = _as_float32(name, value)
+            raw = as_float32(name, value)
 
             def same(one: float) -> bool:
                 return bool(np.float32(one) == raw)
@@ -207,7 +207,7 @@ class Conversation:
         StationError
             If a parameter is infinite or beyond float32.
         """
-        carried = [p if math.isnan(p) else _as_float32(f"parameter {n}", p) for n, p in enumerate(parameters, 1)]
+        carried = [p if math.isnan(p) else as_float32(f"parameter {n}", p) for n, p in enumerate(parameters, 1)]
         given = (*carried, *(_NAN,) * (7 - len(parameters)))
         requests = [
             dialect.MAVLink_command_long_message(self.system(uav), AUTOPILOT, command, n, *given)
@@ -275,8 +275,14 @@ def _as_int32(name: str, value: float) -> int:
     return int(value)
 
 
-def _as_float32(name: str, value: float) -> float:
-    """A number as a message can carry it: what it rounds to."""
+def as_float32(name: str, value: float) -> float:
+    """A number as a message can carry it: what it rounds to.
+
+    Raises
+    ------
+    StationError
+        If it is not finite, or too large.
+    """
     if not abs(value) <= _LARGEST:  # also where it is nan
         raise StationError(f"{name} = {value:.10g}: must be a finite number, at most {_LARGEST:.7g} in size")
     return float(np.float32(value))

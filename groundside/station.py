@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Self
 
-from ftcc.groundside.conversation import Conversation, NoAnswerError, RefusedError, StationError
+from ftcc.groundside.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
 from ftcc.link.failures import KINDS, UNITS
 from ftcc.link.mavlink import AUTOPILOT, dialect
 from ftcc.link.modes import code_of, mode_called
@@ -127,6 +127,8 @@ class Station(Conversation):
         if unit not in UNITS or kind not in KINDS:
             raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
         timed = _At(self, uav, at)
+        for name, value in sizes.items():
+            as_float32(f"FAIL_{name.upper()}", value)
         for name, value in sizes.items():
             self.set(uav, f"FAIL_{name.upper()}", value)
         with timed:
