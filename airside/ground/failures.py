@@ -13,7 +13,7 @@ from ftcc.airside.ground.seat import Seat
 from ftcc.airside.link_events import OWN_RADIO
 from ftcc.airside.link_events import inject as inject_link_event
 from ftcc.airside.model import Model, level_deflections
-from ftcc.link.actuators import ACTUATORS
+from ftcc.link.actuators import ACTUATORS, SLOT, in_slots
 from ftcc.link.channel import Channel
 from ftcc.link.compiled import fields
 from ftcc.link.failures import AIRFRAME_SIZES, EVERY, LINK_SIZES, Meaning, failure_messages, meaning_of
@@ -79,6 +79,9 @@ class Failures:
             return self._fail_link(request, meaning, instance, at_us)
         if self._seat.leader:
             return Answer(DENIED, "a leader is a reference point: it has no parts")
+        missing = self._missing(meaning, instance)
+        if missing:
+            return Answer(UNSUPPORTED, missing)
         if self._waiting is not None:
             return Answer(BUSY, "the vehicle has not answered the last one")
         sizes = [self._seat.sizes[size.name] for size in AIRFRAME_SIZES]
@@ -179,6 +182,15 @@ class Failures:
             if self._seat.sizes[name] != 0.0 or name in ("FAIL_EFF", "FAIL_DUTY")
         )
         return f"{what} {meaning.kind}{': ' if sizes else ''}{sizes}"
+
+    def _missing(self, meaning: Meaning, instance: int) -> str:
+        """What the aircraft has, where it has nothing of what is to fail; else empty."""
+        travel = self._seat.spec.travel
+        asked = meaning.unit.parts if instance == EVERY else meaning.unit.parts[instance - 1 : instance]
+        if not asked or any(travel[SLOT[name]] > 0.0 for name in asked):
+            return ""
+        has = [name for name in in_slots(self._seat.scheme.commands) if travel[SLOT[name]] > 0.0]
+        return f"no {' or '.join(asked)}: it has {', '.join(has)}"
 
     @staticmethod
     def _part(meaning: Meaning, instance: int) -> str:

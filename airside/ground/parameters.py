@@ -64,7 +64,15 @@ class Parameters:
     def __init__(self, seat: Seat, rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> None:
         self._seat = seat
         seat.sizes.update({size.name: size.default for size in SIZES if size.name not in seat.sizes})
-        own = [*_system(seat), *_set_up(), *_sizes(seat), *_channel(seat), *_fire(seat), *_rates(rate_of, set_rate), *_gains(seat)]
+        own = [
+            *_system(seat),
+            *_set_up(),
+            *_sizes(seat),
+            *_channel(seat),
+            *_fire(seat),
+            *_rates(rate_of, set_rate),
+            *_gains(seat),
+        ]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
 

@@ -217,6 +217,16 @@ def test_a_fault_goes_to_the_vehicle_and_its_answer_to_the_ground(bench, station
     assert any(event.outcome == "armed" for event in said(bench))
 
 
+@pytest.mark.parametrize("instance", [1, 3])
+def test_a_part_that_this_aircraft_has_not_is_refused_with_those_that_it_has(bench, station, instance):
+    vehicle = Vehicle(bench)
+    ack = inject(station, vehicle, M.FAILURE_UNIT_SYSTEM_SERVO, M.FAILURE_TYPE_WRONG, instance)
+    assert ack.result == M.MAV_RESULT_UNSUPPORTED
+    assert vehicle.asked == []
+    with pytest.raises(RefusedError, match="no aileron: it has elevator, thrust"):
+        station.fault(1, "aileron", eff=0.5)
+
+
 def test_a_fault_that_leaves_no_trim_is_warned_of(bench, station):
     station.set(1, "FAIL_BIAS", 0.6)
     assert inject(station, Vehicle(bench), *ELEVATOR_WRONG).result == M.MAV_RESULT_ACCEPTED
