@@ -157,8 +157,8 @@ class Control:
                     request = json.loads(link.makefile().readline())
                     command = request.pop("command")
                     answer = {"ok": True, "value": self._handle(command, request)}
-                except (ValueError, KeyError, AttributeError, OSError) as error:
-                    answer = {"ok": False, "error": str(error)}
+                except Exception as error:  # whatever is wrong with a request, the swarm flies on
+                    answer = {"ok": False, "error": str(error) or repr(error)}
                 with contextlib.suppress(OSError):
                     link.sendall(json.dumps(answer).encode() + b"\n")
 

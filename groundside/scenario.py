@@ -227,7 +227,7 @@ def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
         if not rest:
             return value
         if isinstance(node, list):
-            if not rest[0].isdigit() or int(rest[0]) >= len(node):
+            if not rest[0].isdecimal() or int(rest[0]) >= len(node):
                 raise ScenarioError(
                     path, [f"--set {setting}: {key} has {len(node)} entries, counted from 0; {rest[0]} is none of them"]
                 )

@@ -106,8 +106,8 @@ class Endpoint:
             self._socket.send(datagram)
         except ConnectionRefusedError:
             return  # The peer is not there (yet, or any more); whoever waits for its answer notices.
-        except BlockingIOError:
-            return  # The buffer is full: lost, as a datagram may be.
+        except OSError:
+            return  # The buffer is full, or there is no way there at present: lost, as a datagram may be.
 
     def pack(self, *messages: Any) -> bytes:
         """``messages`` as one datagram, with the next sequence numbers.
@@ -131,6 +131,8 @@ class Endpoint:
                 break
             except ConnectionRefusedError:
                 continue
+            except OSError:
+                break  # No way there at present; who waits for an answer notices.
             if self._only is not None and sender not in self._only:
                 self.strangers += 1
                 continue

@@ -51,7 +51,7 @@ def _pack(text: str, uavs: int) -> int:
 
     if text == "auto":
         return automatic_pack(uavs)
-    if not text.isdigit() or not 1 <= int(text) <= uavs:
+    if not text.isdecimal() or not 1 <= int(text) <= uavs:
         fail(f"--pack {text}: must be 'auto' or a number of vehicles per process from 1 to {uavs}")
     return int(text)
 

@@ -1,0 +1,82 @@
+"""The socket by which a swarm is told what to do: whatever comes, the swarm flies on and the caller is answered."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ftcc.groundside.registry import Control, Entry, find, tell
+from ftcc.link.ports import runtime_folder
+
+
+def steps(command: str, arguments: dict[str, Any]) -> int:
+    """As a swarm reads a step."""
+    if command != "step":
+        raise ValueError(f"unknown command {command!r}")
+    return int(arguments["ticks"])
+
+
+@pytest.fixture
+def control(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Control]:
+    monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path))
+    entry = Entry("bench", os.getpid(), "containment", str(tmp_path), (), None, (0, 0), None, 0.0)
+    with closing(Control(entry, steps)) as one:
+        yield one
+
+
+def said(control: Control, line: bytes) -> dict[str, Any]:
+    """What the swarm answers to a line."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(5.0)
+        link.connect(str(runtime_folder() / "bench.sock"))
+        link.sendall(line + b"\n")
+        control.serve()
+        answer: dict[str, Any] = json.loads(link.makefile().readline())
+        return answer
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"no json",
+        b"[1]",
+        b"7",
+        b"null",
+        b'{"ticks": 1}',
+        b'{"command": "land"}',
+        b'{"command": "step"}',
+        b'{"command": "step", "ticks": null}',
+        b'{"command": "step", "ticks": [1]}',
+        b'{"command": "step", "ticks": Infinity}',
+        b'{"command": ["step"]}',
+        b"\xff\xfe",
+    ],
+)
+def test_nonsense_is_refused_and_the_next_caller_is_answered(control: Control, line: bytes) -> None:
+    refused = said(control, line)
+    assert not refused["ok"]
+    assert refused["error"]
+    assert said(control, b'{"command": "step", "ticks": 3}') == {"ok": True, "value": 3}
+
+
+def serve_once(control: Control) -> None:
+    """Answer the next caller."""
+    select.select([control], [], [], 5.0)
+    control.serve()
+
+
+def test_a_swarm_is_found_and_told(control: Control) -> None:
+    server = threading.Thread(target=serve_once, args=(control,))
+    server.start()
+    assert tell(find(None), "step", ticks=5) == 5
+    server.join()
