@@ -241,7 +241,7 @@ class Crew:
                 self.group.alive[i] = 0
                 self.ground[i].end()
             elif message.get_type() == "COMMAND_ACK":
-                self.ground[i].failures.vehicle_answered(message)
+                self.ground[i].vehicle_answered(message)
                 self.report_soon()
 
     @property

@@ -81,8 +81,8 @@ class GroundLink:
 
     def report(self, now_us: int) -> None:
         """After a tick: say what acts, and send the telemetry that is due."""
-        self.failures.tell_what_acts(now_us)
-        self.offboard.expire(now_us)
+        self._survive("telling what acts", partial(self.failures.tell_what_acts, now_us))
+        self._survive("offboard's end", partial(self.offboard.expire, now_us))
         for peer, schedule in self._flows:
             due = schedule.due(now_us)
             if due and peer.there:
@@ -141,6 +141,10 @@ class GroundLink:
         for socket in self.sockets:
             for peer in socket.peers:
                 peer.send(beat)
+
+    def vehicle_answered(self, message: Any) -> None:
+        """COMMAND_ACK of the vehicle."""
+        self._survive("the vehicle's answer", partial(self.failures.vehicle_answered, message))
 
     def text(self, severity: int, text: str, peer: Peer | None = None) -> None:
         """STATUSTEXT to every ground station, or to one."""
