@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import subprocess
@@ -26,6 +27,11 @@ class Swarm(NamedTuple):
     station: int
     """Port of a ground station."""
 
+    def ports(self) -> dict[int, int]:
+        """By UAV the port on which its autopilot hears whoever calls."""
+        (card,) = Path(self.flight.environment["FTCC_RUNTIME_DIR"]).glob("ftcc/*.json")
+        return {vehicle["uav"]: vehicle["port"] for vehicle in json.loads(card.read_text())["vehicles"]}
+
     def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run an `ftcc` command against it."""
         return subprocess.run(
@@ -41,13 +47,19 @@ def free_port() -> int:
 
 
 @pytest.fixture(scope="module")
-def swarm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Swarm]:
+def listeners() -> tuple[int, ...]:
+    """Ports of further ground stations, where a module's tests have some."""
+    return ()
+
+
+@pytest.fixture(scope="module")
+def swarm(tmp_path_factory: pytest.TempPathFactory, listeners: tuple[int, ...]) -> Iterator[Swarm]:
     """Level flight without faults, slowly: a machine that is busy for a moment must not lose an aircraft."""
     folder: Path = tmp_path_factory.mktemp("swarm")
     offboard, station = free_port(), free_port()
     environment = {**os.environ, "FTCC_RUNTIME_DIR": str(folder / "runtime")}
     level = "attitude.commands=[{at=0.0, bank=0.0, alpha=0.034906585, sideslip=0.0}]"
-    addresses = [f"--mavlink=127.0.0.1:{port}" for port in (offboard, station)]
+    addresses = [f"--mavlink=127.0.0.1:{port}" for port in (offboard, station, *listeners)]
     arguments = [FAMILY, "--speed", "0.25", "--pack", "auto", "--duration", "60", "--set", "faults=[]", "--set", level]
     flight = Flight([*arguments, *addresses], folder / "run", environment)
     try:
