@@ -14,9 +14,7 @@ master.wait_heartbeat()
 
 def arm(value):
     command = mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-    master.mav.command_long_send(
-        master.target_system, master.target_component, command, 0, value, 0, 0, 0, 0, 0, 0
-    )
+    master.mav.command_long_send(master.target_system, master.target_component, command, 0, value, 0, 0, 0, 0, 0, 0)
     ack = master.recv_match(type="COMMAND_ACK", condition=f"COMMAND_ACK.command=={command}", blocking=True, timeout=20)
     return mavutil.mavlink.enums["MAV_RESULT"][ack.result].name
 
