@@ -95,3 +95,32 @@ def test_a_session(swarm: Swarm, tmp_path: Path) -> None:
         assert 800_000 < int(position.group(1)) < 1_200_000
     finally:
         proxy.close()
+
+
+def test_what_a_user_types_at_any_vehicle(swarm: Swarm, tmp_path: Path) -> None:
+    """Arming, disarming, take-off, plans, files, logs, ping, speed: each is answered."""
+    proxy = MavProxy(swarm.offboard, tmp_path)
+    try:
+        for uav in range(1, 5):
+            proxy.wait_for(f"vehicle {uav}:1 on link")
+        proxy.type("vehicle 3", "Set vehicle 3")
+        proxy.type("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
+        proxy.type("disarm", "COMPONENT_ARM_DISARM: DENIED")
+        proxy.wait_for("AP: in the air")
+        proxy.type("takeoff 100", "NAV_TAKEOFF: ACCEPTED")
+        proxy.type("mode", "Available modes: .*LOITER.*MISSION")
+        proxy.type("long DO_SET_MODE 129 4 3", "DO_SET_MODE: ACCEPTED")
+        proxy.wait_for("Mode LOITER")
+        proxy.type("long DO_SET_MODE 129 4 4", "DO_SET_MODE: ACCEPTED")
+        proxy.type("long DO_SET_MODE 129 4 5", "DO_SET_MODE: DENIED")
+        proxy.type("wp list", "Requesting 0 waypoints")
+        proxy.type("fence list", "Requesting 0 fence items")
+        proxy.type("rally list", "Requesting 0 rally items")
+        proxy.type("ftp list /", "Listing /")
+        proxy.type("log list", "No logs")
+        proxy.type("ping", "ping response: .* from=3/1")
+        proxy.type("setspeed 25", "DO_CHANGE_SPEED: DENIED")
+        proxy.type("param fetch COM_OF_LOSS_T", r"COM_OF_LOSS_T = \d")
+        proxy.type("reboot", "PREFLIGHT_REBOOT_SHUTDOWN: DENIED")
+    finally:
+        proxy.close()

@@ -120,8 +120,30 @@ AFTERWARDS = (
 """Programs that pip installs with pymavlink, as they are, with the log of ``record.py``."""
 
 
-def run(command: list[str]) -> str:
-    """What a program prints, if it ends well."""
+PUBLISHED = os.environ.get("FTCC_MAVSDK_EXAMPLES", "")
+"""A folder with MAVSDK's own examples."""
+PUBLISHED_PROGRAMS = (
+    (["params.py", "URL", "get_all"], 0, ("Discovered autopilot", "SYS_FAILURE_EN: 1", r"COM_OF_LOSS_T: \d")),
+    (["params.py", "URL", "get", "SYS_FAILURE_EN"], 0, ("Wrong type", "Ok", "SYS_FAILURE_EN: 1")),
+    (["params.py", "URL", "set", "COM_OF_LOSS_T", "1.5"], 0, ("Setting 1.5 as float...Ok",)),
+    (
+        ["telemetry.py"],
+        1,
+        (
+            "Found valid autopilot system",
+            "Arming...",
+            "Taking off...",
+            r"Position update: Lat=47\.\d+, Lon=8\.\d+",
+            "Current position",
+            "Landing...",
+        ),
+    ),
+)
+"""Its arguments, its exit code, and what it prints: the last one ends where it wants to land."""
+
+
+def run(command: list[str], code: int = 0) -> str:
+    """What a program prints, if it ends with this exit code."""
     done = subprocess.run(
         [sys.executable, "-u", *command],
         capture_output=True,
@@ -130,7 +152,7 @@ def run(command: list[str]) -> str:
         check=False,
         env={**os.environ, "MAVLINK20": "1"},
     )
-    assert done.returncode == 0, f"{command} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    assert done.returncode == code, f"{command} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
 
@@ -148,7 +170,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("record") / "mav.tlog"
 
 
-LISTENERS = {program.path: free_port() for program in PROGRAMS if program.uav is None}
+LISTENERS = {program.path: free_port() for program in PROGRAMS if program.uav is None} | {PUBLISHED: free_port()}
 
 
 @pytest.fixture(scope="module")
@@ -185,3 +207,18 @@ def test_a_tool_of_pymavlink_reads_what_was_recorded(
 ) -> None:
     outcomes["pymavlink/record.py"].result()
     assert_printed(program.expected, run([str(TOOLS / program.path), str(record)]))
+
+
+@pytest.mark.skipif(not PUBLISHED, reason="FTCC_MAVSDK_EXAMPLES names no folder with MAVSDK's published examples")
+@pytest.mark.parametrize(
+    ("command", "code", "expected"), PUBLISHED_PROGRAMS, ids=[" ".join(one[0]) for one in PUBLISHED_PROGRAMS]
+)
+def test_a_published_example_works(
+    command: list[str], code: int, expected: tuple[str, ...], outcomes: dict[str, Future[str]], tmp_path: Path
+) -> None:
+    """Nothing but the address is changed."""
+    url = f"udpin://127.0.0.1:{LISTENERS[PUBLISHED]}"
+    name, *arguments = command
+    program = tmp_path / name
+    program.write_text((Path(PUBLISHED) / name).read_text(encoding="utf-8").replace("udpin://0.0.0.0:14540", url))
+    assert_printed(expected, run([str(program), *(url if one == "URL" else one for one in arguments)], code))
