@@ -24,6 +24,8 @@ PATIENCE = 15.0
 COMPONENT_INFORMATION, COMPONENT_METADATA, PROTOCOL_VERSION = 395, 397, 300
 """Messages, and a command, that not every dialect of pymavlink's has."""
 REQUEST_OPERATOR_CONTROL = 32100
+SETUP = {"SYS_AUTOSTART", "CAL_GYRO0_ID", "CAL_ACC0_ID", "CAL_MAG0_ID", "COM_RC_IN_MODE"}
+"""What it reads of every PX4 to see whether it is set up; where one is missing it says so in a message box."""
 LOITER, RETURN, MISSION = (4 << 16 | sub << 24 for sub in (3, 5, 4))
 """PX4's custom modes."""
 
@@ -190,7 +192,7 @@ def _parameters(control: GroundControl) -> bool:
         assert message is not None, f"{len(names)} parameters came"
         names[message.param_index] = message.param_id
         if len(names) == message.param_count:
-            return len(set(names.values())) == len(names)
+            return len(set(names.values())) == len(names) and set(names.values()) >= SETUP
 
 
 def _parameter(control: GroundControl) -> bool:
