@@ -194,6 +194,8 @@ def test_strangers_on_every_port_change_nothing(fly: Callable[..., Flight], ftcc
     entry = find(None)
     with Station() as station:
         before = {uav: station.parameters(uav) for uav in station.uavs}
+    # Two seconds of wall time: it must not be over before they come.
+    assert ftcc("speed", "10").returncode == 0
     assert ftcc("resume").returncode == 0
     sent = strangers(list(range(entry.ports[0], entry.ports[1] + 1)), 100, 1000.0)
     assert sent > 4000
