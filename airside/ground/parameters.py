@@ -147,6 +147,14 @@ def _system(seat: Seat) -> Iterator[Parameter]:
         60.0,
         meaning="simulated time without targets after which offboard becomes hold, s, 0: never",
     )
+    yield Parameter(
+        "MIS_TAKEOFF_ALT",
+        lambda: seat.takeoff_altitude,
+        lambda value: setattr(seat, "takeoff_altitude", value),
+        0.0,
+        1e5,
+        meaning="m, kept for clients that set it before a take-off, which does nothing in the air",
+    )
     yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
 
 
@@ -156,7 +164,8 @@ _SET_UP = {
     "CAL_GYRO0_ID": (1.0, "the gyroscopes are calibrated"),
     "CAL_ACC0_ID": (1.0, "the accelerometers are"),
     "CAL_MAG0_ID": (1.0, "the compass is"),
-    "CBRK_AIRSPD_CHK": (162128.0, "the airspeed sensor needs no check"),
+    "SYS_HAS_NUM_ASPD": (0.0, "no airspeed sensor is to be calibrated"),
+    "CBRK_AIRSPD_CHK": (162128.0, "it needs no check"),
 }
 """What a ground station of PX4 wants to know before it calls an aircraft set up; nothing here can be changed."""
 

@@ -19,7 +19,9 @@ __all__ = ["MESSAGES", "Message"]
 
 _M = dialect
 _FTP_NAK = 129
-_FTP_UNKNOWN_COMMAND = 7
+_FTP_END_OF_FILE, _FTP_UNKNOWN_COMMAND, _FTP_NOT_FOUND = 6, 7, 10
+_FTP_ERRORS = {3: _FTP_END_OF_FILE, 4: _FTP_NOT_FOUND, 14: _FTP_NOT_FOUND, 15: _FTP_NOT_FOUND}
+"""By request: a folder is listed to its end, a file to be read is not found; all others are unknown."""
 
 
 def _parameter_list(link: GroundLink, peer: Peer, message: Any) -> None:
@@ -121,14 +123,15 @@ def _ping(link: GroundLink, peer: Peer, message: Any) -> None:
 
 
 def _files(link: GroundLink, peer: Peer, message: Any) -> None:
-    """MAVLink FTP: there are no files; every request but an answer of somebody else is refused."""
+    """MAVLink FTP of a vehicle without files; answers to somebody else's questions are left alone."""
     payload = list(message.payload)
     if payload[3] >= 128:
         return
     answer = [0] * 251
     sequence = (payload[0] | payload[1] << 8) + 1
     answer[0], answer[1], answer[2] = sequence & 0xFF, sequence >> 8 & 0xFF, payload[2]
-    answer[3], answer[4], answer[5], answer[12] = _FTP_NAK, 1, payload[3], _FTP_UNKNOWN_COMMAND
+    answer[3], answer[4], answer[5] = _FTP_NAK, 1, payload[3]
+    answer[12] = _FTP_ERRORS.get(payload[3], _FTP_UNKNOWN_COMMAND)
     peer.send(_M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer))
 
 
@@ -172,7 +175,7 @@ MESSAGES: dict[str, Message] = {
     "MISSION_CLEAR_ALL": Message(_mission_answer(_M.MAV_MISSION_ACCEPTED), "MISSION_ACK: it is empty"),
     "TIMESYNC": Message(_timesync, "TIMESYNC on the simulated clock"),
     "PING": Message(_ping, "PING, to who asked"),
-    "FILE_TRANSFER_PROTOCOL": Message(_files, "refused: there are no files"),
+    "FILE_TRANSFER_PROTOCOL": Message(_files, "there are no files: lists are empty, nothing is found"),
     "LOG_REQUEST_LIST": Message(_logs, "LOG_ENTRY: no logs; the run's folder has them"),
     "SET_ATTITUDE_TARGET": Message(_target, _TARGET.format("an attitude of a follower that refers to one")),
     "SET_POSITION_TARGET_LOCAL_NED": Message(_target, _TARGET.format("altitude and forward speed of a leader")),

@@ -70,6 +70,8 @@ class Seat:
     """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
     patience: float = 1.0
     """Parameter COM_OF_LOSS_T: simulated time without targets after which offboard becomes hold, s; 0 = never."""
+    takeoff_altitude: float = 10.0
+    """Parameter MIS_TAKEOFF_ALT, m: without effect."""
     failures_enabled: int = 1
     """Parameter SYS_FAILURE_EN."""
     fault_tolerance: bool = True

@@ -69,22 +69,23 @@ def _say(text: str) -> None:
 
 
 def vehicles(swarm: Swarm = None, key: Key = None) -> None:
-    """List the UAVs of a running swarm and what they tell of themselves."""
+    """List the UAVs of a running swarm, the UDP port at which each is called, and what they tell of themselves."""
     from rich.table import Table
 
     from ftcc.groundside.station import NoAnswerError
 
-    table = Table("UAV", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
+    table = Table("UAV", "port", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
     silent = False
     with _station(swarm, key) as station:
         for uav, state in zip(station.uavs, station.vehicles(), strict=True):
+            card = station.card(uav)
             if isinstance(state, NoAnswerError):
-                table.add_row(str(uav), station.card(uav).role, "does not answer")
+                table.add_row(str(uav), str(card.port), card.role, "does not answer")
                 silent = True
                 continue
             tolerance = {None: "", True: "on", False: "off"}[state.fault_tolerance]
             numbers = (f"{state.t:.2f}", f"{state.altitude:.2f}", f"{state.airspeed:.2f}")
-            table.add_row(str(uav), state.role, state.mode, *numbers, tolerance)
+            table.add_row(str(uav), str(card.port), state.role, state.mode, *numbers, tolerance)
     terminal().print(table)
     if silent:
         raise typer.Exit(2)

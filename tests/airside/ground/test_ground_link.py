@@ -50,6 +50,9 @@ def test_what_a_ground_station_asks_at_connection_is_answered(station):
     listing = M.MAVLink_file_transfer_protocol_message(0, 1, 1, [7, 0, 0, 3] + [0] * 247)
     files = ask(station, listing, "FILE_TRANSFER_PROTOCOL")
     assert list(files.payload[:6]) == [8, 0, 0, 129, 1, 3]
+    for request, error in ((3, 6), (4, 10), (15, 10), (7, 7)):
+        question = M.MAVLink_file_transfer_protocol_message(0, 1, 1, [7, 0, 0, request] + [0] * 247)
+        assert ask(station, question, "FILE_TRANSFER_PROTOCOL").payload[12] == error
 
 
 @pytest.mark.parametrize("command", [M.MAV_CMD_DO_JUMP, M.MAV_CMD_REQUEST_CAMERA_INFORMATION, M.MAV_CMD_LOGGING_START])
