@@ -6,6 +6,7 @@ one. This module imports neither numba nor numpy, so that what is kept can be ha
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import functools
 import hashlib
@@ -16,12 +17,15 @@ import os
 import shutil
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "kept"]
+from ftcc.link.folders import cache_folder
+
+__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "kept", "not_kept"]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -32,6 +36,9 @@ _LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
 """What the contents depend on beside the sources: pymavlink gives the layouts of messages."""
 _LOOK, _SILENT, _PATIENCE = 0.02, 3.0, 30.0
 """A process that waits for another one that writes looks so often, tells so after so long, and then gives up, s."""
+
+_told: set[str] = set()
+"""Warnings that this process has given."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -104,14 +111,23 @@ def folder() -> Path:
     for path in _source_files():
         digest.update(str(path).encode())
         digest.update(path.read_bytes())
-    base = Path(os.environ.get("FTCC_CACHE_DIR") or Path.home() / ".cache" / "ftcc") / "compiled"
-    own = base / digest.hexdigest()[:16]
-    own.mkdir(parents=True, exist_ok=True)
-    os.utime(own)
-    others = sorted((path for path in base.iterdir() if path != own), key=lambda path: path.stat().st_mtime)
-    for stale in others[: max(0, len(others) - _KEPT_CACHES + 1)]:
-        shutil.rmtree(stale, ignore_errors=True)
+    own = cache_folder(f"compiled/{digest.hexdigest()[:16]}")
+    # Others clear away at the same time, and what lies there may be another user's.
+    with contextlib.suppress(OSError):
+        os.utime(own)
+        others = sorted((path for path in own.parent.iterdir() if path != own), key=lambda path: path.stat().st_mtime)
+        for stale in others[: max(0, len(others) - _KEPT_CACHES + 1)]:
+            shutil.rmtree(stale, ignore_errors=True)
     return own
+
+
+def not_kept(error: OSError) -> None:
+    """Warn, once for each reason, that the cache takes nothing: what it should hold is made anew at every start."""
+    why = error.strerror or error
+    text = f"compiled code cannot be kept, each start compiles anew: {why}; set FTCC_CACHE_DIR to a folder with room"
+    if text not in _told:
+        _told.add(text)
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 def kept(function: F) -> F:
@@ -130,12 +146,17 @@ def kept(function: F) -> F:
         path = folder() / "kept" / f"{function.__module__}.{function.__name__}" / f"{name}.json"
         try:
             return json.loads(path.read_bytes())
-        except (FileNotFoundError, ValueError):
+        except (OSError, ValueError):  # not there, another user's, or damaged
             result = function(*arguments)
-        path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_suffix(f".{os.getpid()}")
-        unfinished.write_text(json.dumps(result), encoding="utf-8")
-        unfinished.replace(path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            unfinished.write_text(json.dumps(result), encoding="utf-8")
+            unfinished.replace(path)
+        except OSError as error:
+            not_kept(error)
+            with contextlib.suppress(OSError):
+                unfinished.unlink(missing_ok=True)
         return result
 
     return recalled  # type: ignore[return-value]

@@ -13,7 +13,6 @@ import itertools
 import math
 import os
 import sys
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,7 +54,7 @@ os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from numba.core import types  # noqa: E402
-from numba.core.caching import IndexDataCacheFile  # noqa: E402
+from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import overload  # noqa: E402
@@ -112,10 +111,24 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     code is called with arguments that it was not made for, and may do anything: crash, or never return.
     """
 
+    def load(self, key: Any) -> Any:
+        """The code for the types ``key``; None, and it is compiled again, where there is none that can be read."""
+        try:
+            return super().load(key)
+        except Exception:  # pickle raises whatever a damaged file, as of a computer that went off, makes it do
+            return None
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:  # as above
+            return {}
+
     def save(self, key: Any, data: Any) -> None:
         """Add the code ``data`` for the types ``key``; where that cannot be had, the next start compiles again."""
         try:
             with cache.alone(cache_folder):
+                os.makedirs(self._cache_path, exist_ok=True)
                 overloads = self._load_index()
                 known = set(overloads.values())
                 free = (name for n in itertools.count(1) if (name := self._data_name(n)) not in known)
@@ -124,8 +137,19 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
                 self._save_data(name, data)
                 if key not in overloads:
                     self._save_index(overloads | {key: name})
-        except cache.CacheBusyError as busy:
-            warnings.warn(f"{self._index_name} is not kept: {busy}", RuntimeWarning, stacklevel=2)
+        except OSError as error:
+            cache.not_kept(error)
+
+
+class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
+    """Keeps to the folder of `cache` where that cannot be written: numba would go on to ``__pycache__``, whose code
+    knows nothing of an edit elsewhere."""
+
+    def ensure_cache_path(self) -> None:
+        """Nothing: who writes creates it."""
+
+
+CacheImpl._locator_classes = [_Locator]
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

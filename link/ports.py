@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import socket
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+
+from ftcc.link.folders import runtime_folder
 
 __all__ = ["PortBlock", "PortError", "UavPorts", "reserve", "runtime_folder"]
 
@@ -70,14 +69,6 @@ class PortBlock:
         if self.guard is not None:
             self.guard.close()
             self.guard = None
-
-
-def runtime_folder() -> Path:
-    """Where running swarms are listed and locks lie; private to the user."""
-    base = os.environ.get("FTCC_RUNTIME_DIR") or os.environ.get("XDG_RUNTIME_DIR")
-    folder = Path(base) / "ftcc" if base else Path(tempfile.gettempdir()) / f"ftcc-{os.getuid()}"
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    return folder
 
 
 def _in_use(base: int, size: int) -> int | None:

@@ -16,6 +16,8 @@ import time
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from ftcc.link.folders import config_folder
+
 __all__ = ["KeyFileError", "Refusal", "Signing", "default_key_file", "new_key_file", "read_key", "stamps_file"]
 
 _EPOCH = 1_420_070_400
@@ -60,9 +62,14 @@ class KeyFileError(ValueError):
 
 
 def default_key_file() -> Path:
-    """Where `new_key_file` writes unless told otherwise."""
-    base = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "ftcc" / "mavlink.key"
+    """Where `new_key_file` writes unless told otherwise.
+
+    Raises
+    ------
+    NoFolderError
+        Where there is no home: a key is nothing for a temporary folder.
+    """
+    return config_folder() / "mavlink.key"
 
 
 def new_key_file(path: Path) -> None:
@@ -75,12 +82,17 @@ def new_key_file(path: Path) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(secrets.token_urlsafe(32) + "\n")
+        file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w")
     except FileExistsError:
         raise KeyFileError(f"{path}: is there already; a key is never overwritten") from None
     except OSError as error:
-        raise KeyFileError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise KeyFileError(f"{path}: cannot be written: {error.strerror or error}; give another FILE") from None
+    try:
+        with file:
+            file.write(secrets.token_urlsafe(32) + "\n")
+    except OSError as error:
+        path.unlink()  # the half of a key would be in the way of the next one
+        raise KeyFileError(f"{path}: cannot be written: {error.strerror or error}; give another FILE") from None
 
 
 def read_key(path: Path) -> bytes:

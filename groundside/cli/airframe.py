@@ -133,10 +133,7 @@ def _shown(mode: Mode) -> str:
 
 def _draw(found: dict[float, list[Mode]], title: str, file: Path) -> None:
     """Poles in the complex plane, and those near the origin once more."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from ftcc.groundside.canvas import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.5), layout="constrained")
     markers = {"short period": "o", "phugoid": "s", "roll": "D", "Dutch roll": "^", "spiral": "v", "roll-spiral": "*"}

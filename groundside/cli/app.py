@@ -11,6 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 from ftcc.groundside.cli import airframe, fly, ground, results, scenarios, study, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.errors import UserError
+from ftcc.link.folders import NoFolderError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,5 +101,5 @@ def main() -> None:
     warnings.showwarning = lambda message, *_, **__: warn(str(message))
     try:
         app()
-    except UserError as error:
+    except (UserError, NoFolderError) as error:
         fail(str(error))

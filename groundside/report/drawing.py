@@ -10,16 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
-
-matplotlib.use("Agg")  # figures go into files; no window, no display
-
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
+from ftcc.groundside.canvas import Line2D, plt
 from ftcc.groundside.metrics import unwrapped
 from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of

@@ -22,10 +22,7 @@ def draw(study: Study, outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
     Thick: quartiles; thin: smallest to largest; dashed: the claim's bound, dotted: what it expects of its case. A claim
     of which no flight shows a number is left out; where only some do, it is said how many.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from ftcc.groundside.canvas import plt
 
     shown = [quantity for quantity in quantities(study) if quantity.among(outcomes)]
     if not shown:

@@ -127,3 +127,12 @@ def test_what_is_done_alone_may_fail_and_lets_go(tmp_path):
         raise ZeroDivisionError
     with cache.alone(tmp_path):
         assert (tmp_path / ".writing").read_text() == str(os.getpid())
+
+
+def test_a_result_that_cannot_be_kept_is_given_all_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "_told", set())
+    (tmp_path / "kept").write_text("a file where a folder should be: nothing can be written below it")
+    asked = Asked(lambda: 1.5)
+    with pytest.warns(RuntimeWarning, match="Not a directory; set FTCC_CACHE_DIR") as told:
+        assert (function(asked)(), function(asked)(), asked.times) == (1.5, 1.5, 2)
+    assert len(told) == 1

@@ -139,9 +139,20 @@ def test_a_cache_that_another_process_holds_for_ever_costs_the_kept_code_alone(t
 
     monkeypatch.setattr(cache, "alone", never)
     file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
-    with pytest.warns(RuntimeWarning, match=r"law-1.py.nbi is not kept: process 7"):
+    with pytest.warns(RuntimeWarning, match=r"compiled code cannot be kept.*: process 7 has held it"):
         file.save(("key", 1), "code")
     assert file.load(("key", 1)) is None
+
+
+def test_damaged_code_is_compiled_again(tmp_path):
+    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    file.save("key", "code")
+    for path in tmp_path.glob("law-1.py.*"):
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-5])
+        assert file.load("key") is None
+        file.save("key", "code")
+        assert (file.load("key"), path.read_bytes()) == ("code", whole)
 
 
 def test_old_caches_are_cleared_away(tmp_path):
