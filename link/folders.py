@@ -1,7 +1,7 @@
 """Folders in which the program keeps something of the user's: compiled code, running swarms, keys.
 
-They are where the user's environment says (``FTCC_...``, ``XDG_...``, ``HOME``). Where such a folder cannot be written, as
-in a container without a home, a private one below the system's temporary directory stands in, with one line of warning.
+They are where the user's environment says (``FTCC_...``, ``XDG_...``, ``HOME``). Where such a folder cannot be written,
+as in a container without a home, a private one below the system's temporary directory stands in, with a warning.
 """
 
 from __future__ import annotations

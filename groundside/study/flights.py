@@ -1,4 +1,7 @@
-"""The flights of a study, on all cores: processes that load the compiled law once, then fly trial after trial."""
+"""The flights of a study, on all cores: processes that load the compiled law once, then fly trial after trial.
+
+With one job, or where what such processes share (semaphores, in ``/dev/shm``) cannot be had, all fly in this one.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.launcher import no_main_module
@@ -54,6 +57,15 @@ class Outcome:
         return "; ".join([self.problem] if self.problem else lost)
 
 
+class _Work(NamedTuple):
+    """What a process that flies trials must know."""
+
+    study: Study
+    record_in: Path | None
+    stop: Any
+    """An event that ends its flight; None in the process that hears Ctrl-C itself."""
+
+
 class _StoppedError(Exception):
     """The study has been interrupted."""
 
@@ -76,7 +88,7 @@ def fly_all(
     ----------
     study : Study
     jobs : int
-        Number of processes.
+        Number of processes; 1: this one, which a trial that dies takes with it.
     report : callable
         Called with every outcome as it comes, in no particular order.
     record_in : Path, optional
@@ -91,42 +103,65 @@ def fly_all(
     """
     trials = collections.deque(study.trials)
     jobs = min(jobs, len(trials))
-    context = multiprocessing.get_context("spawn")
-    stop = context.Event()
-    pool_of = functools.partial(
-        ProcessPoolExecutor, mp_context=context, initializer=_begin, initargs=(study, record_in, stop)
-    )
+    stop = _semaphores() if jobs > 1 else None
     try:
         with _heard_ctrl_c() as go_on:
-            return _fly_trials(study, trials, jobs, pool_of, report, ready, go_on)
+            # Compiled once here, or by every process at the same time.
+            timing = study.mission.timing._replace(ticks=0)
+            fly(dataclasses.replace(study.mission, timing=timing))
+            go_on()
+            if ready is not None:
+                ready()
+            if stop is None:
+                _fly_here(_Work(study, record_in, None), trials, report, go_on)
+            else:
+                _fly_in_pools(_Work(study, record_in, stop), trials, jobs, report, go_on)
+            return True
     except KeyboardInterrupt:
         return False
     finally:
-        stop.set()
+        if stop is not None:
+            stop.set()
 
 
-def _fly_trials(
-    study: Study,
+def _semaphores() -> Any:
+    """What stops the processes, made of the semaphores that they share; None, with a warning, where there are none."""
+    try:
+        return multiprocessing.get_context("spawn").Event()
+    except (OSError, ImportError) as error:
+        why = getattr(error, "strerror", None) or error
+        text = f"no semaphores for several processes ({why}; they lie in /dev/shm): all flights fly in this one"
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
+        return None
+
+
+def _fly_here(
+    work: _Work, trials: collections.deque[Trial], report: Callable[[Outcome], None], go_on: Callable[[], None]
+) -> None:
+    """Fly the trials one after the other in this process."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlainPython)
+        while trials:
+            outcome = _flown(work, trials.popleft())
+            go_on()  # a flight that Ctrl-C has cut short is no outcome
+            report(outcome)
+
+
+def _fly_in_pools(
+    work: _Work,
     trials: collections.deque[Trial],
     jobs: int,
-    pool_of: Callable[[int], ProcessPoolExecutor],
     report: Callable[[Outcome], None],
-    ready: Callable[[], None] | None,
     go_on: Callable[[], None],
-) -> bool:
-    """Fly what `fly_all` has been given; True once all is flown."""
-    # Compiled once here, or by every process at the same time.
-    timing = study.mission.timing._replace(ticks=0)
-    fly(dataclasses.replace(study.mission, timing=timing))
-    go_on()
-    if ready is not None:
-        ready()
+) -> None:
+    """Fly the trials in so many processes at a time."""
+    context = multiprocessing.get_context("spawn")
+    pool_of = functools.partial(ProcessPoolExecutor, mp_context=context, initializer=_begin, initargs=(work,))
     while trials:
         for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report, go_on):
             # A process died. Whose fault it was shows when each of those that were in flight flies alone.
             for guilty in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report, go_on):
                 report(Outcome(guilty, (), {}, 0.0, "its process died"))
-    return True
 
 
 @contextlib.contextmanager
@@ -220,24 +255,28 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 
 # In the processes.
 
-_work: tuple[Study, Path | None, Any]
+_work: _Work
 
 
-def _begin(study: Study, record_in: Path | None, stop: Any) -> None:
+def _begin(work: _Work) -> None:
     global _work
-    _work = (study, record_in, stop)
+    _work = work
     warnings.simplefilter("ignore", PlainPython)
 
 
 def _fly(trial: Trial) -> Outcome:
+    return _flown(_work, trial)
+
+
+def _flown(work: _Work, trial: Trial) -> Outcome:
     """Fly one trial; whatever goes wrong with it is its outcome."""
-    study, record_in, stop = _work
+    study, record_in, stop = work
     mission = study.mission_of(trial)
     if mission is None:
         return Outcome(trial, (), {}, 0.0, study.combinations[trial.combination].problem)
 
     def go_on(_: float) -> None:
-        if stop.is_set():
+        if stop is not None and stop.is_set():
             raise _StoppedError
 
     begun = time.perf_counter()

@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -218,3 +219,41 @@ def wait_until(condition: Callable[[], bool], process: subprocess.Popen[bytes], 
         assert process.poll() is None, "ended before its time"
         assert time.monotonic() < until
         time.sleep(0.02)
+
+
+def test_one_job_needs_no_other_process_and_gives_the_same(
+    flown: tuple[Any, Path], scenario: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flights, "multiprocessing", None)
+    study = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
+    outcomes: list[Outcome] = []
+    assert fly_all(study, 1, outcomes.append)
+    assert table(study, outcomes).drop(["wall"]).equals(flown[0].drop(["wall"]))
+
+
+@pytest.mark.parametrize("error", [OSError(30, "Read-only file system"), OSError(28, "full"), ImportError("none")])
+def test_without_semaphores_all_fly_in_this_process_with_a_warning(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    class Context:
+        def Event(self) -> None:  # noqa: N802 (the library's name)
+            raise error
+
+    monkeypatch.setattr(flights.multiprocessing, "get_context", lambda _: Context())
+    outcomes: list[Outcome] = []
+    with pytest.warns(RuntimeWarning, match=rf"{getattr(error, 'strerror', None) or error}.*fly in this one"):
+        assert fly_all(plan_study(scenario, seeds=2), 2, outcomes.append)
+    assert [outcome.problem for outcome in outcomes] == ["", ""]
+
+
+def test_ctrl_c_in_this_process_reports_nothing_of_the_flight_that_it_cuts_short(scenario: Path) -> None:
+    outcomes: list[Outcome] = []
+
+    def report(outcome: Outcome) -> None:
+        outcomes.append(outcome)
+        if len(outcomes) == 2:
+            threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    assert not fly_all(plan_study(scenario, seeds=1000), 1, report)
+    assert 2 <= len(outcomes) < 1000
+    assert {outcome.verdict.flown for outcome in outcomes if outcome.verdict} == {SECONDS}
