@@ -117,6 +117,7 @@ def draw(run: Run, recording: Path, rate: float = RATE) -> Path:
     """Draw a run's dashboard into a recording (.rrd), from what it recorded."""
     from ftcc.groundside.dashboard import Dashboard, Subject
 
+    recording.touch()  # where that cannot be written, nothing is drawn
     dashboard = Dashboard(Subject.of(run.mission), recording=recording, viewer="none")
     for snapshot in snapshots_of(run, rate):
         dashboard.log(snapshot)

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import itertools
 import os
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.errors import UserError
+from ftcc.groundside.sole_writer import keep
 from ftcc.groundside.table import write_table
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 
@@ -31,8 +34,14 @@ class RunError(UserError):
     """A folder that is no run, or a run that cannot be read."""
 
 
-def new_folder(name: str, out: str | Path | None = None, kind: str = "runs", holds: str = "scenario.toml") -> Path:
+_HELD = ("scenario.toml", "study.parquet")
+"""What shows that a folder has a run or a study in it."""
+
+
+def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> Path:
     """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the present folder.
+
+    No other process gets it before this one ends.
 
     Parameters
     ----------
@@ -40,29 +49,40 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs", hol
     out : Path, optional
     kind : str
         Instead of ``runs``.
-    holds : str
-        The file that such a folder has.
 
     Raises
     ------
     RunError
-        If it cannot be written, or ``out`` already holds a run.
+        If it cannot be written, or ``out`` already holds a run or a study.
+    BusyFolderError
+        If another process writes into it.
     """
-    if out is None:
-        stem = Path(kind) / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
-        tries = [stem, *(stem.with_name(f"{stem.name}-{n}") for n in range(2, 100))]
-        folder = next(path for path in tries if not path.exists())
-    else:
-        folder = Path(out)
-    if (folder / holds).exists():
-        raise RunError(f"--out {folder}: already holds {holds}; give a folder that is empty or does not exist")
+    folder = Path(kind) if out is None else Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder, os.W_OK):
+        if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(f"no permission to write into {folder}")
+        if out is None:
+            folder = _first_free(folder / f"{name}-{datetime.now():%Y%m%d-%H%M%S}")
+        keep(folder)
+        held = [file for file in _HELD if (folder / file).exists()]
     except OSError as error:
-        raise RunError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
+        instead = "; name a folder that can be with --out" if out is None else ""
+        option = "" if out is None else "--out "
+        raise RunError(f"{option}{folder}: cannot be written: {error.strerror or error}{instead}") from None
+    if held:
+        raise RunError(f"--out {folder}: already holds {held[0]}; give a folder that is empty or does not exist")
     return folder
+
+
+def _first_free(stem: Path) -> Path:
+    """Create the folder, or, where there is one already, that with the first free number."""
+    for n in itertools.count(2):
+        folder = stem if n == 2 else stem.with_name(f"{stem.name}-{n - 1}")
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError("numbers do not end")
 
 
 class NothingRecordedError(RunError):

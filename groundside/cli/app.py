@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 __all__ = ["app", "main"]
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)
+"""What keeps files from being written that is nobody's mistake here."""
 
 _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
     "Scenarios": (
@@ -97,9 +101,13 @@ for _title, _commands in _SECTIONS.items():
 
 
 def main() -> None:
-    """Entry point: bad input ends with one message and exit code 2."""
+    """Entry point: bad input, and no room or right to write, end with one message and exit code 2."""
     warnings.showwarning = lambda message, *_, **__: warn(str(message))
     try:
         app()
     except (UserError, NoFolderError) as error:
         fail(str(error))
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        fail(f"{error.filename or 'a file'}: cannot be written: {error.strerror}; make room, or write elsewhere")

@@ -148,7 +148,6 @@ def fly(
     uavs = [spec.uav for spec in mission.vehicles]
     _check_systems(max(uavs), id_offset)
     _check_key(key, [uav + id_offset for uav in uavs])
-    folder = new_run_folder(mission, out)
 
     from ftcc.groundside.fly import FlightOptions
     from ftcc.groundside.fly import fly as fly_mission
@@ -158,8 +157,8 @@ def fly(
     try:
         ports = reserve(uavs, port)
     except PortError as error:
-        folder.rmdir()
         fail(str(error))
+    folder = new_run_folder(mission, out)
     options = FlightOptions(
         folder=folder,
         lockstep=clock == "lockstep",

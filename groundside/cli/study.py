@@ -62,7 +62,7 @@ def study(
         duration=duration,
     )
     mission, trials = planned.mission, planned.trials
-    folder = new_folder(mission.name, out, "studies", "study.parquet")
+    folder = new_folder(mission.name, out, "studies")
     (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
 
     outcomes: list[Outcome] = []

@@ -13,6 +13,7 @@ from ftcc.groundside.report.page import Cell, Head, Page, Section, write
 from ftcc.groundside.report.report import draw_figures
 from ftcc.groundside.report.terminal import number
 from ftcc.groundside.run import Run
+from ftcc.groundside.sole_writer import sole_writer
 
 __all__ = ["Comparison", "labels_of"]
 
@@ -84,7 +85,11 @@ class Comparison:
         return heads, rows
 
     def write(self, folder: Path) -> Path:
-        """Draw the figures and write the page."""
+        """Draw the figures and write the page; refused where another process is writing one."""
+        with sole_writer(folder):
+            return self._write(folder)
+
+    def _write(self, folder: Path) -> Path:
         flights = [
             Flown(label, run, run.mission) for label, run in zip(self.labels, self.runs, strict=True) if run.uavs
         ]

@@ -25,6 +25,7 @@ from ftcc.groundside.report.page import (
 )
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.run import NothingRecordedError, Run
+from ftcc.groundside.sole_writer import sole_writer
 
 if TYPE_CHECKING:
     from ftcc.groundside.mission import Mission
@@ -48,9 +49,18 @@ def write_report(run: Run, folder: Path | None = None) -> Path:
     """Write the report of a run, complete or not, and return its page.
 
     A run that recorded nothing has a report that says so: its scenario, its events, its claims as not flown.
+
+    Raises
+    ------
+    BusyFolderError
+        If another process is writing one there.
     """
+    with sole_writer(folder or run.path / "report"):
+        return _write(run, folder or run.path / "report")
+
+
+def _write(run: Run, folder: Path) -> Path:
     mission = run.mission
-    folder = folder or run.path / "report"
     notes = []
     try:
         signals: Any = run
