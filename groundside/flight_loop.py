@@ -79,6 +79,14 @@ class Recording(NamedTuple):
     """(k,): why a UAV was lost, 0 = it was not."""
     lost_us: NDArray[np.int64]
     """(k,): when."""
+    first: NDArray[np.int64]
+    """(2,): which row, and which report, of the flight the first of each here is."""
+
+    def begin(self, row: int, report: int) -> None:
+        """Empty it for the rows from ``row`` and the reports from ``report`` on."""
+        for part in (self.truth, self.command, self.acting, self.conditions, self.signals, self.links):
+            part.fill(np.nan)
+        self.first[:] = row, report
 
 
 def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple[int, int]) -> Recording:
@@ -98,6 +106,7 @@ def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple
         links=np.full((reports, *edges, len(LINK_REPORT)), np.nan),
         lost=np.zeros(k, np.int64),
         lost_us=np.zeros(k, np.int64),
+        first=np.zeros(2, np.int64),
     )
 
 
@@ -123,15 +132,23 @@ class World(NamedTuple):
 
 
 def new_world(
-    vehicles: Sequence[VehicleSpec], specs: Sequence[AutopilotSpec], timing: Timing, conditions: int
+    vehicles: Sequence[VehicleSpec],
+    specs: Sequence[AutopilotSpec],
+    timing: Timing,
+    conditions: int,
+    room: int | None = None,
 ) -> World:
-    """The swarm before the first tick; only the simulator knows ``conditions`` numbers of each vehicle."""
+    """The swarm before the first tick; only the simulator knows ``conditions`` numbers of each vehicle.
+
+    Its recording has room for the rows of so many ticks, by default of all.
+    """
     autopilots, inbox = build_autopilots(specs, timing)
     uavs = [spec.uav for spec in specs]
     senders = [[neighbour.uav for neighbour in spec.neighbours] for spec in specs]
     signals, values = autopilots.signals.shape[1], autopilots.shared.shape[1]
     widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, signals)
-    rows, reports = timing.ticks // timing.record_every + 1, timing.ticks // timing.report_every + 1
+    last = (timing.ticks + 1 if room is None else room) - 1
+    rows, reports = last // timing.record_every + 1, last // timing.report_every + 1
     return World(
         fleet=build_vehicles(vehicles),
         autopilots=autopilots,
@@ -295,7 +312,7 @@ def _record(world, timing, n):
     every, report_every = timing.record_every, ticks_a_second(timing.period_us)
     for i in range(recording.lost.shape[0]):
         if n % every == 0 and _flies(recording, i, now):
-            row = n // every
+            row = n // every - recording.first[0]
             copy(world.true[i], recording.truth[row, i])
             copy(fleet.command[i], recording.command[row, i])
             copy(fleet.acting[i], recording.acting[row, i])
@@ -303,7 +320,8 @@ def _record(world, timing, n):
             copy(world.autopilots.signals[i], recording.signals[row, i])
         if n % report_every == 0 and recording.lost[i] == 0:
             for edge in range(world.inbox.degree[i]):
-                report_link(world.inbox, i, edge, recording.links[n // report_every, i, edge])
+                report = n // report_every - recording.first[1]
+                report_link(world.inbox, i, edge, recording.links[report, i, edge])
 
 
 @compiled

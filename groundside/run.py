@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.errors import UserError
+from ftcc.groundside.merging import merge_parts
 from ftcc.groundside.sole_writer import keep
-from ftcc.groundside.table import write_table
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 
 if TYPE_CHECKING:
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from ftcc.groundside.verdict import Verdict
 
 __all__ = ["NothingRecordedError", "Run", "RunError", "new_folder"]
+
+
+_MEMORY = 128 << 20
+"""Bytes of columns that a run keeps in memory."""
 
 
 class RunError(UserError):
@@ -104,6 +108,10 @@ class Run:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._kept: dict[tuple[str, int], NDArray[Any]] = {}
+        """Columns by name and UAV, what was asked for last at the end."""
+        self._used = 0
+        """Bytes of them."""
         if not (self.path / "scenario.toml").is_file():
             raise RunError(f"{self.path}: is no run's folder (there is no scenario.toml in it)")
 
@@ -162,8 +170,11 @@ class Run:
 
     @functools.cached_property
     def signals(self) -> Any:
-        """The recording as a ``pyarrow.Table``: a row per recorded tick and UAV; units in the columns' metadata."""
-        return self._table(None)
+        """The recording as a ``pyarrow.Table``: a row per recorded tick and UAV; units in the columns' metadata.
+
+        All of it, in memory: of a long flight, ask for one `column` after the other.
+        """
+        return self._readable(self._open.read)
 
     @functools.cached_property
     def _open(self) -> Any:
@@ -182,22 +193,35 @@ class Run:
         return found
 
     @functools.cached_property
-    def _rows(self) -> tuple[NDArray[np.int64], dict[int, slice]]:
-        """Order that sorts the rows by UAV, and where each UAV's rows then are."""
-        uavs = self._read("uav")
-        order = np.argsort(uavs, kind="stable")
-        ids, starts = np.unique(uavs[order], return_index=True)
-        ends = np.append(starts[1:], len(uavs))
-        return order, {int(uav): slice(int(a), int(b)) for uav, a, b in zip(ids, starts, ends, strict=True)}
+    def _rows(self) -> dict[int, int]:
+        """How many rows there are of each UAV, by id, ascending."""
+        rows: dict[int, int] = {}
+        for group in range(self._open.num_row_groups):
+            for uav, count in zip(*np.unique(self._group(group, ["uav"])[0], return_counts=True), strict=True):
+                rows[int(uav)] = rows.get(int(uav), 0) + int(count)
+        return dict(sorted(rows.items()))
 
-    def _read(self, name: str) -> NDArray[Any]:
-        if name not in self.columns:
-            raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
-        return self._table([name]).column(0).to_numpy()  # type: ignore[no-any-return]
+    def _group(self, group: int, names: list[str]) -> list[NDArray[Any]]:
+        """Columns of a group of rows, all UAVs together."""
+        table = self._readable(lambda: self._open.read_row_group(group, columns=names))
+        return [table.column(name).to_numpy() for name in names]
 
-    def _table(self, names: list[str] | None) -> Any:
-        """Columns of the recording, or all."""
-        return self._readable(lambda: self._open.read(columns=names))
+    def _read(self, name: str, uavs: Sequence[int]) -> dict[int, NDArray[Any]]:
+        """A column of some UAVs, each in order of time. No more than a group of rows is there of the others."""
+        found = {
+            uav: np.empty(self._rows[uav], self._open.schema_arrow.field(name).type.to_pandas_dtype()) for uav in uavs
+        }
+        filled = dict.fromkeys(uavs, 0)
+        everybody = np.array(list(self._rows))
+        for group in range(self._open.num_row_groups):
+            values, whose = self._group(group, [name, "uav"])
+            # Mostly everybody has a row at every time.
+            square = len(whose) % len(everybody) == 0 and (whose.reshape(-1, len(everybody)) == everybody).all()
+            for uav in uavs:
+                own = values[list(self._rows).index(uav) :: len(everybody)] if square else values[whose == uav]
+                found[uav][filled[uav] : filled[uav] + len(own)] = own
+                filled[uav] += len(own)
+        return found
 
     def _readable(self, read: Callable[[], Any]) -> Any:
         """What ``read`` gives, or a message that says which file is damaged and what may help."""
@@ -219,16 +243,27 @@ class Run:
     @property
     def uavs(self) -> tuple[int, ...]:
         """Ids of those of whom there are rows."""
-        return tuple(self._rows[1])
-
-    @functools.cache  # noqa: B019 (a run is short-lived, its columns are read again and again)
-    def _sorted(self, name: str) -> NDArray[Any]:
-        return self._read(name)[self._rows[0]]  # type: ignore[no-any-return]
+        return tuple(self._rows)
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
-        """A column of one UAV in order of time; empty if the UAV has no rows."""
-        place = self._rows[1].get(uav)
-        return self._sorted(name)[place] if place is not None else np.empty(0)
+        """A column of one UAV in order of time; empty if the UAV has no rows.
+
+        What was asked for lately is kept in memory, up to a limit.
+        """
+        if name not in self.columns:
+            raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
+        if uav not in self._rows:
+            return np.empty(0)
+        if (name, uav) not in self._kept:
+            # Of a short flight, others will be asked for next; of a long one, there is no room for theirs.
+            small = 8 * self._open.metadata.num_rows <= _MEMORY / 4
+            for one, values in self._read(name, list(self._rows) if small else [uav]).items():
+                self._kept[name, one] = values
+                self._used += values.nbytes
+        found = self._kept[name, uav] = self._kept.pop((name, uav))
+        while self._used > _MEMORY and len(self._kept) > 1:
+            self._used -= self._kept.pop(next(iter(self._kept))).nbytes
+        return found
 
     def merge(self) -> Path:
         """Join what the processes wrote into ``signals.parquet``; what a killed one wrote counts to its last batch.
@@ -242,28 +277,9 @@ class Run:
         """
         # Taken before the parts are read: what is written to them meanwhile makes the table old.
         as_of = self._recorded_until
-        tables: dict[int, list[Any]] = {}
-        for path in sorted((self.path / "parts").glob("*.arrows")):
-            table = read_part(path) if not path.stem.endswith("-links") else None
-            if table is not None:
-                # The vehicle's part first: its columns lead.
-                tables.setdefault(int(path.name.split("-")[0]), []).append((path.stem.endswith("autopilot"), table))
-        if not any(table.num_rows for pairs in tables.values() for _, table in pairs):
-            raise NothingRecordedError(f"{self.path}: nothing was recorded")
-        parts = {uav: [table for _, table in sorted(pairs, key=lambda p: p[0])] for uav, pairs in tables.items()}
-        columns = [
-            Column(f.name, f.metadata[b"unit"].decode(), f.metadata[b"meaning"].decode())
-            for after in (False, True)
-            for pairs in tables.values()
-            for autopilot, table in pairs
-            if autopilot == after
-            for f in table.schema
-        ]
-        joined = [_joined(uav, parts[uav], [c.name for c in columns]) for uav in sorted(parts)]
-        values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
-        order = np.lexsort((values["uav"], values["t"]))
         target = self.path / "signals.parquet"
-        write_table(target, columns, {name: column[order] for name, column in values.items()}, as_of)
+        if not merge_parts(self.path / "parts", target, as_of):
+            raise NothingRecordedError(f"{self.path}: nothing was recorded")
         return target
 
     @functools.cached_property
@@ -297,17 +313,3 @@ class Run:
         }
         contents["units"] = {column.name: column.unit for column in self.columns.values() if column.name != "uav"}
         savemat(file, contents, do_compression=True, oned_as="column")
-
-
-def _joined(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """The parts of one UAV side by side, a row for every time that occurs."""
-    times = [table.column("t").to_numpy() for table in tables]
-    t = np.unique(np.concatenate(times))
-    joined: dict[str, NDArray[Any]] = {name: np.full(len(t), np.nan) for name in names}
-    joined["t"], joined["uav"] = t, np.full(len(t), uav, np.int32)
-    for table, own in zip(tables, times, strict=True):
-        rows = np.searchsorted(t, own)
-        for name in table.column_names:
-            if name not in ("t", "uav"):
-                joined[name][rows] = table.column(name).to_numpy()
-    return joined

@@ -1,10 +1,17 @@
-"""A whole flight in one process: the same functions in the same order as between processes, and the same recording."""
+"""A whole flight in one process: the same functions in the same order as between processes, and the same recording.
+
+`fly` keeps it in memory, `simulate` writes it while it flies, block by block: an hour takes as much memory as a
+minute.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import signal
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,7 +25,7 @@ from ftcc.airside.autopilots import tick_of, told
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.mission import Mission
 from ftcc.groundside.run import Run
-from ftcc.groundside.table import write_table
+from ftcc.groundside.table import TableWriter
 from ftcc.groundside.verdict import FILE, Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.link.channel import LINK_REPORT
@@ -29,16 +36,21 @@ from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import conditions_of, cycle_of, find
 
-__all__ = ["Flight", "PlainPython", "TooLargeError", "fly", "loop_of", "record", "simulate"]
+__all__ = ["Flight", "PlainPython", "TooLargeError", "fly", "loop_of", "simulate"]
 
 _CHUNKS = 100
 """A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
+
+_BLOCK = 65536
+"""Rows, of all UAVs together, that `simulate` has in memory and then writes."""
+_LEAST_SHARE = 0.1
+"""Of what rows take in memory, what they take on disk at the very least: only what never changes takes less."""
 
 Progress = Callable[[float], None]
 
 
 class TooLargeError(UserError):
-    """A flight whose recording does not fit into memory."""
+    """A flight whose recording does not fit into memory, or not on the disk."""
 
 
 class PlainPython(UserWarning):
@@ -47,7 +59,7 @@ class PlainPython(UserWarning):
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight in memory; offers its columns as a `Run` does."""
+    """A flight, or a part of one, in memory; offers its columns as a `Run` does."""
 
     mission: Mission
     truth: NDArray[np.float64]
@@ -68,6 +80,8 @@ class Flight:
     """When (s) and why a UAV was lost."""
     events: tuple[tuple[float, int, str, str], ...] = ()
     """What happened otherwise: time s, UAV, severity, text."""
+    first_report: int = 0
+    """Number of the first one in ``links``."""
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -103,10 +117,15 @@ class Flight:
         """How it went."""
         return judge(self, self.mission, self.lost)
 
+    @functools.cached_property
+    def _flown(self) -> list[int]:
+        """Rows of each UAV, in the order of the mission."""
+        return [int(rows) for rows in np.isfinite(self.truth[:, :, 0]).sum(axis=0)]
+
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
         """A column of one UAV in order of time, as far as it flew."""
         i = self.mission.uavs.index(uav)
-        rows = int(np.isfinite(self.truth[:, i, 0]).sum())
+        rows = self._flown[i]
         if name == "t":
             return self.t[:rows]
         values, n = self._places[name]
@@ -115,16 +134,16 @@ class Flight:
     def link_table(self) -> dict[str, NDArray[Any]]:
         """A row per report and in-edge, by time, then receiver; the columns of ``link.recording.LINK_COLUMNS``."""
         timing = self.mission.timing
-        times = np.arange(len(self.links)) * (timing.report_every * timing.period_us / 1e6)
+        numbers = np.arange(self.first_report, self.first_report + len(self.links))
+        times = numbers * (timing.report_every * timing.period_us / 1e6)
         edges = [
             (i, edge, spec.uav, neighbour.uav)
             for i, spec in sorted(enumerate(self.mission.autopilots), key=lambda pair: pair[1].uav)
             for edge, neighbour in enumerate(spec.neighbours)
         ]
         values = [self.links[:, i, edge] for i, edge, _, _ in edges]
-        rows = (
-            np.stack(values, axis=1).reshape(len(times) * len(edges), -1) if values else np.empty((0, len(LINK_REPORT)))
-        )
+        rows = np.stack(values, axis=1) if values else np.empty(0)
+        rows = rows.reshape(len(times) * len(edges), len(LINK_REPORT))
         table: dict[str, NDArray[Any]] = {
             "t": np.repeat(times, len(edges)),
             "uav": np.tile(np.array([edge[2] for edge in edges], np.int32), len(times)),
@@ -147,16 +166,21 @@ class Flight:
         return table
 
 
-def _require_memory(mission: Mission) -> None:
-    """Refuse a flight whose recording does not fit into the free memory; while it is written it is there twice."""
+def _size(mission: Mission) -> tuple[int, float]:
+    """Rows of each UAV, and the GB that all of them take."""
     timing, uavs = mission.timing, len(mission.uavs)
     rows = timing.ticks // timing.record_every + 1
     columns = 2 + len(TRUTH) + 2 * 4 + len(conditions_of(mission.plant)) + len(mission.scheme.signals)
-    needed, free = 2 * 8 * rows * uavs * columns, psutil.virtual_memory().available
+    return rows, 8 * rows * uavs * columns / 1e9
+
+
+def _require(mission: Mission, needed: float, free: float, of: str) -> None:
+    """Refuse a flight whose recording takes more GB than are free."""
     if needed > free:
+        what = f"{_size(mission)[0]} rows of {len(mission.uavs)} UAVs"
         raise TooLargeError(
-            f"duration = {timing.duration:g}: {rows} rows of {uavs} UAVs take {needed / 1e9:.1f} GB of memory, "
-            f"{free / 1e9:.1f} GB are free; fly shorter, or lower record_rate"
+            f"duration = {mission.timing.duration:g}: {what} take {needed:.1f} GB of {of}, {free:.1f} GB are free; "
+            "fly shorter, or lower record_rate"
         )
 
 
@@ -185,32 +209,73 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
     TooLargeError
         If the recording does not fit into memory.
     """
-    _require_memory(mission)
+    # What is made of it takes as much again.
+    _require(mission, 2 * _size(mission)[1], psutil.virtual_memory().available / 1e9, "memory")
+    return _fly(mission, mission.timing.ticks + 1, lambda _: None, progress, ready)
+
+
+def _fly(
+    mission: Mission,
+    room: int,
+    take: Callable[[Flight], None],
+    progress: Progress | None,
+    ready: Callable[[], None] | None,
+) -> Flight:
+    """Fly a mission; ``take`` is given what was recorded after every ``room`` ticks, and the last part comes back."""
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
     if loop.tick.REFUSAL:
-        warnings.warn(loop.tick.REFUSAL, PlainPython, stacklevel=2)
-    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)))
+        warnings.warn(loop.tick.REFUSAL, PlainPython, stacklevel=3)
+    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room)
     loop.fly(world, timing, mission.wire, 0, 0)
     if ready is not None:
         ready()
     end = timing.ticks + 1
-    chunk = max(1, -(-end // _CHUNKS))
-    flown = 0
+    chunk = min(room, max(1, -(-end // _CHUNKS)))
+    flown = taken = 0
     interrupted = False
     events: list[tuple[float, int, str, str]] = []
     while flown < end and not interrupted:
         try:
-            loop.fly(world, timing, mission.wire, flown, min(end, flown + chunk))
+            if flown == taken + room:
+                with _ctrl_c_waits():
+                    take(_part(mission, world.recording, taken, flown, events))
+                    taken = flown
+                    world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
+            until = min(end, flown + chunk, taken + room)
+            loop.fly(world, timing, mission.wire, flown, until)
             events += _happened(mission, world.fleet, world.autopilots)
-            flown = min(end, flown + chunk)
+            flown = until
             if progress is not None:
                 progress((flown - 1) * timing.period)
         except KeyboardInterrupt:
             # What has been flown is recorded; a shorter flight than was asked for is not hidden.
             interrupted = True
-    recording = world.recording
-    rows = (flown - 1) // timing.record_every + 1 if flown else 0
+    return _part(mission, world.recording, taken, flown, events)
+
+
+@contextlib.contextmanager
+def _ctrl_c_waits() -> Iterator[None]:
+    """Ctrl-C that comes meanwhile is heard afterwards: no block is written by half. It only reaches the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
+def _part(mission: Mission, recording: Any, begin: int, end: int, events: list[tuple[float, int, str, str]]) -> Flight:
+    """What ticks ``begin`` .. ``end`` - 1 have recorded, and what has happened up to then."""
+    timing = mission.timing
+    row, report = (int(first) for first in recording.first)
+    rows = ((end - 1) // timing.record_every + 1 if end > begin else row) - row
+    reports = ((end - 1) // timing.report_every + 1 if end > begin else report) - report
     return Flight(
         mission=mission,
         truth=recording.truth[:rows],
@@ -218,14 +283,15 @@ def fly(mission: Mission, progress: Progress | None = None, ready: Callable[[], 
         acting=recording.acting[:rows],
         conditions=recording.conditions[:rows],
         signals=recording.signals[:rows],
-        links=recording.links[: (flown - 1) // timing.report_every + 1 if flown else 0],
-        t=np.arange(rows) * timing.record_every * timing.period_us / 1e6,
+        links=recording.links[:reports],
+        t=np.arange(row, row + rows) * timing.record_every * timing.period_us / 1e6,
         lost={
             uav: (float(recording.lost_us[i] / 1e6), LOST[int(recording.lost[i])])
             for i, uav in enumerate(mission.uavs)
             if recording.lost[i] > 0
         },
         events=tuple(events),
+        first_report=report,
     )
 
 
@@ -240,23 +306,49 @@ def _happened(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float
 def simulate(
     mission: Mission, folder: Path, progress: Progress | None = None, ready: Callable[[], None] | None = None
 ) -> Run:
-    """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would."""
-    return record(fly(mission, progress, ready), folder)
+    """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would.
 
-
-def record(flight: Flight, folder: Path) -> Run:
-    """Write a flight into ``folder``, as the processes of a swarm would."""
-    # Arrow, and what the columns' descriptions pull in, are not needed before the flight.
+    Raises
+    ------
+    TooLargeError
+        If the recording surely does not fit on the disk.
+    OSError
+        If it cannot be written, as on a disk that is full.
+    """
+    # What the columns' descriptions pull in is not needed where nothing is recorded.
     from ftcc.airside.process import columns as autopilot_columns
     from ftcc.sim.process import columns as vehicle_columns
 
-    mission = flight.mission
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    _require(mission, _LEAST_SHARE * _size(mission)[1], psutil.disk_usage(str(folder)).free / 1e9, "disk at least")
+    timing = mission.timing
+    columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
+    last = 0.0
+    with (
+        TableWriter(folder / "signals.parquet", columns) as signals,
+        TableWriter(folder / "links.parquet", LINK_COLUMNS) as links,
+    ):
+
+        def take(part: Flight) -> None:
+            nonlocal last
+            signals.write(part.table())
+            links.write(part.link_table())
+            last = float(part.t[-1]) if len(part.t) else last
+
+        room = min(timing.ticks + 1, max(1, _BLOCK // len(mission.uavs)) * timing.record_every)
+        rest = _fly(mission, room, take, progress, ready)
+        with contextlib.suppress(KeyboardInterrupt), _ctrl_c_waits():
+            take(rest)
+    return _concluded(mission, folder, last, rest)
+
+
+def _concluded(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
+    """The run of a flight whose signals up to ``last`` (s) are in ``folder``: with scenario, events and verdict."""
     (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
     events = EventLog(folder / "events.jsonl")
     for t, uav, severity, text in mission.events:
-        if len(flight.t) and t <= flight.t[-1]:
+        if t <= last:
             events.write(t, text, uav, severity)
     if refusal := tick_of(mission.scheme.name).REFUSAL:
         events.write(0.0, refusal, severity="warning")
@@ -264,13 +356,12 @@ def record(flight: Flight, folder: Path) -> Run:
         events.write(t, f"{AIRCRAFT_LOST}{why}", uav, "error")
     for t, uav, severity, text in flight.events:
         events.write(t, text, uav, severity)
-    last = float(flight.t[-1]) if len(flight.t) else 0.0
     if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
         events.write(last, "interrupted", severity="warning")
-    events.write(last, flight.verdict.text, severity=flight.verdict.severity)
+    run = Run(folder)
+    run.mission = mission
+    run.verdict = judge(run, mission, flight.lost)
+    events.write(last, run.verdict.text, severity=run.verdict.severity)
     events.close()
-    (folder / FILE).write_text(flight.verdict.dumps(), encoding="utf-8")
-    columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
-    write_table(folder / "signals.parquet", columns, flight.table())
-    write_table(folder / "links.parquet", LINK_COLUMNS, flight.link_table())
-    return Run(folder)
+    (folder / FILE).write_text(run.verdict.dumps(), encoding="utf-8")
+    return run

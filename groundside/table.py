@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftcc.link.recording import Column, arrow_schema
 from ftcc.sim.plant import TRUTH
 
-__all__ = ["LEADING", "leading", "write_table"]
+__all__ = ["LEADING", "TableWriter", "leading"]
 
 _SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
@@ -34,27 +34,44 @@ def _ordered(columns: Sequence[Column]) -> list[Column]:
     return first + rest
 
 
-def write_table(
-    path: Path, columns: Sequence[Column], values: Mapping[str, NDArray[Any]], as_of: int | None = None
-) -> None:
-    """Write a table: a Parquet file that appears when it is complete.
+class TableWriter:
+    """Writes a table block by block: a Parquet file that appears when it is complete, and not where that fails.
 
     Parameters
     ----------
     path : Path
     columns : sequence of Column
         Of all parts, repetitions allowed.
-    values : mapping of arrays by column name, one row per tick and UAV.
     as_of : int, optional
         The file's time of change, ns; default: now.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    ordered = _ordered(columns)
-    table = pa.Table.from_arrays([pa.array(values[c.name]) for c in ordered], schema=arrow_schema(ordered))
-    unfinished = path.with_suffix(f".{os.getpid()}")
-    pq.write_table(table, unfinished, use_dictionary=False, compression="lz4", write_statistics=["t", "uav"])
-    if as_of is not None:
-        os.utime(unfinished, ns=(as_of, as_of))
-    unfinished.replace(path)
+    def __init__(self, path: Path, columns: Sequence[Column], as_of: int | None = None) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self._pa = pa
+        self._path, self._as_of = path, as_of
+        self._unfinished = path.with_suffix(f".{os.getpid()}")
+        self._columns = _ordered(columns)
+        self._schema = arrow_schema(self._columns)
+        options = {"use_dictionary": False, "compression": "lz4", "write_statistics": ["t", "uav"]}
+        self._file = pq.ParquetWriter(self._unfinished, self._schema, **options)
+
+    def write(self, values: Mapping[str, NDArray[Any]]) -> None:
+        """Append rows: an array by column name, one entry per tick and UAV."""
+        arrays = [self._pa.array(values[column.name]) for column in self._columns]
+        self._file.write_table(self._pa.Table.from_arrays(arrays, schema=self._schema))
+
+    def __enter__(self) -> TableWriter:
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        try:
+            self._file.close()
+            if kind is None:
+                if self._as_of is not None:
+                    os.utime(self._unfinished, ns=(self._as_of, self._as_of))
+                self._unfinished.replace(self._path)
+        finally:
+            self._unfinished.unlink(missing_ok=True)

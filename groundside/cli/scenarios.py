@@ -103,7 +103,8 @@ def simulate(
     from rich.progress import BarColumn, Progress, TextColumn
 
     from ftcc.groundside.claims import evaluate
-    from ftcc.groundside.simulate import fly, record
+    from ftcc.groundside.run import RunError
+    from ftcc.groundside.simulate import simulate as simulate_mission
 
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     folder = new_run_folder(mission, out)
@@ -121,16 +122,16 @@ def simulate(
             )
 
         try:
-            flight = fly(mission, lambda t: progress.update(task, completed=t), ready)
+            run = simulate_mission(mission, folder, lambda t: progress.update(task, completed=t), ready)
+        except OSError as error:
+            raise RunError(
+                f"{folder}: cannot be written: {error.strerror or error}; make room, or give --out"
+            ) from None
         finally:
             compiling.cancel()
-        record(flight, folder)
-    # What was recorded is in memory still.
-    show_summary(folder, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration))
-    judged(flight.verdict, strict)
-    end = float(flight.t[-1]) if len(flight.t) else 0.0
-    interrupted = end < mission.timing.duration - mission.timing.period * mission.timing.record_every
-    if flight.lost or interrupted:
+    show_summary(folder, evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration))
+    judged(run.verdict, strict)
+    if run.lost or run.verdict.flown < mission.timing.duration:
         raise typer.Exit(1)
 
 

@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.launcher import no_main_module
-from ftcc.groundside.simulate import PlainPython, fly, record
+from ftcc.groundside.run import Run
+from ftcc.groundside.simulate import Flight, PlainPython, fly, simulate
 from ftcc.groundside.study.plan import Study, Trial
 from ftcc.groundside.verdict import Verdict
 
@@ -281,9 +282,9 @@ def _flown(work: _Work, trial: Trial) -> Outcome:
 
     begun = time.perf_counter()
     try:
-        flight = fly(mission, go_on)
-        if record_in is not None:
-            record(flight, run_folder(record_in, trial))
+        flight: Flight | Run = (
+            fly(mission, go_on) if record_in is None else simulate(mission, run_folder(record_in, trial), go_on)
+        )
         results = evaluate(flight, mission.claims, mission.case, mission.graph)
         verdict = flight.verdict
     except _StoppedError:

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["judge"]
 
 Array = NDArray[np.float64]
-_NEVER: Array = np.empty(0)
+_MEMORY = 32 << 20
+"""Bytes of values that are kept for when they are asked for again."""
 
 END, LEAST_END = 0.05, 2.0
 """What counts as the end of a flight, for errors and bounds: this share of it, so many seconds at least."""
@@ -81,24 +82,33 @@ class _Flight:
         self.graph = mission.graph
         self.lost = lost
         self._values: dict[tuple[str, int], Array] = {}
+        self._room = _MEMORY
         self.row = mission.timing.record_every * mission.timing.period
         """Time from row to row, s."""
-        self.times = {uav: signals.column("t", uav) for uav in signals.uavs}
-        self.end = max((float(t[-1]) for t in self.times.values() if len(t)), default=0.0)
+        self.until = {uav: float(t[-1]) for uav in signals.uavs if len(t := signals.column("t", uav))}
+        """When the recording of a UAV ends, s."""
+        self.end = max(self.until.values(), default=0.0)
         self.closing = self.end - min(max(END * self.end, LEAST_END), self.end / 2.0) - _CLOSE
         """When the end begins, s."""
-        self.followers = [uav for uav in self.graph.followers if len(self.times.get(uav, _NEVER))]
+        self.followers = [uav for uav in self.graph.followers if uav in self.until]
+
+    def times(self, uav: int) -> Array:
+        """Of a UAV's rows, s."""
+        return self.signals.column("t", uav)
 
     def lasted(self, uav: int) -> bool:
         """Whether a UAV flew to the end."""
-        t = self.times.get(uav, _NEVER)
-        return uav not in self.lost and bool(len(t)) and t[-1] >= self.end - _TOGETHER
+        return uav not in self.lost and self.until.get(uav, -1.0) >= self.end - _TOGETHER
 
     def of(self, expression: str, uav: int) -> Array:
         """An expression at all times of a UAV."""
-        if (expression, uav) not in self._values:
-            self._values[expression, uav] = evaluated(expression, self.signals, self.graph, uav)
-        return self._values[expression, uav]
+        found = self._values.get((expression, uav))
+        if found is None:
+            found = evaluated(expression, self.signals, self.graph, uav)
+            if found.nbytes <= self._room:
+                self._room -= found.nbytes
+                self._values[expression, uav] = found
+        return found
 
     def has(self, expression: str) -> bool:
         """Whether the recording can say it: places between leaders need leaders that reach everybody."""
@@ -113,8 +123,7 @@ def _losses(flight: _Flight) -> Iterator[Loss]:
         if uav in flight.lost:
             yield Loss(uav, *flight.lost[uav])
         elif flight.end > 0.0 and not flight.lasted(uav):
-            t = flight.times.get(uav, _NEVER)
-            yield Loss(uav, float(t[-1]) if len(t) else 0.0, "its recording ends")
+            yield Loss(uav, flight.until.get(uav, 0.0), "its recording ends")
 
 
 def _tracking(flight: _Flight) -> Iterator[TrackingError]:
@@ -125,7 +134,7 @@ def _tracking(flight: _Flight) -> Iterator[TrackingError]:
         largest, end = (-1.0, 0, 0.0), (-1.0, 0)
         too_large = False
         for uav in flight.followers:
-            t = flight.times[uav]
+            t = flight.times(uav)
             x = np.abs(flight.of(error.name, uav))
             there = np.flatnonzero(np.isfinite(x))
             if not len(there):
@@ -176,7 +185,7 @@ def _outside(flight: _Flight) -> Iterator[Outside]:
 def _left(flight: _Flight, name: str, meaning: str, uav: int, beyond: NDArray[np.bool_]) -> Iterator[Outside]:
     rows = np.flatnonzero(beyond)
     if len(rows):
-        until = float(flight.times[uav][rows[-1]])
+        until = float(flight.times(uav)[rows[-1]])
         at_end = flight.lasted(uav) and until >= flight.closing
         yield Outside(name, meaning, uav, len(rows) * flight.row, until, at_end)
 
@@ -212,7 +221,7 @@ def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
     """The worst oscillation of each UAV, in shares of what is allowed."""
     given: list[float] | None = None
     for uav in filter(flight.lasted, flight.followers):
-        t = flight.times[uav]
+        t = flight.times(uav)
         worst, size = None, 0.0
         for name, unit, x, floor in _oscillating(flight, uav):
             found = oscillation(t, x, floor)
@@ -245,7 +254,7 @@ def _given(flight: _Flight) -> list[float]:
     signals = flight.signals
     own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]
     conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
-    columns = [(uav, name) for uav in flight.graph.leaders if len(flight.times.get(uav, _NEVER)) for name in ("z", "V")]
+    columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in ("z", "V")]
     columns += [(uav, name) for uav in flight.followers for name in own + conditions]
-    found = (oscillation(flight.times[uav], signals.column(name, uav)) for uav, name in columns)
+    found = (oscillation(flight.times(uav), signals.column(name, uav)) for uav, name in columns)
     return [one.frequency for one in found if one is not None]

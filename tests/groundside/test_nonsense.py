@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
+import psutil
 import pytest
 
 from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.mission import Mission
-from ftcc.groundside.simulate import TooLargeError, fly
+from ftcc.groundside.simulate import TooLargeError, fly, simulate
 
 MISSION_AT_500 = ["start.z=500", "leaders.7.z=500", "leaders.8.z=500", "leaders.7.commands.0.altitude=600"]
 GUARDED = "start of UAV 1: flight-path angle left the model: gamma = 1.5 rad, plant.guards.flight_path_angle = 1 rad"
@@ -112,3 +116,12 @@ def test_a_recording_that_does_not_fit_into_memory_is_refused() -> None:
     endless = mission("demo", "rates.control_rate=1000", "record_rate=1000", duration=1e5)
     with pytest.raises(TooLargeError, match=r"100000001 rows of 8 UAVs take \d+\.\d GB of memory"):
         fly(endless)
+
+
+def test_a_recording_that_does_not_fit_on_the_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    endless = mission("demo", "rates.control_rate=1000", "record_rate=1000", duration=1e5)
+    room = shutil.disk_usage(tmp_path)._replace(free=10_000_000_000)
+    monkeypatch.setattr(psutil, "disk_usage", lambda _: room)
+    with pytest.raises(TooLargeError, match=r"rows of 8 UAVs take \d+\.\d GB of disk at least, 10\.0 GB are free"):
+        simulate(endless, tmp_path / "run")
+    assert not list((tmp_path / "run").iterdir())

@@ -14,7 +14,7 @@ from ftcc.groundside import Run
 from ftcc.groundside.mission import Mission, resolve
 from ftcc.groundside.replay import snapshots_of
 from ftcc.groundside.scenario import ScenarioError, load
-from ftcc.groundside.simulate import fly, record
+from ftcc.groundside.simulate import fly, simulate
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, FILE, REMARKS, Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.sim.plants import conditions_of
@@ -242,7 +242,7 @@ def test_a_lower_loop_twice_as_slow_cycles_in_all_four_aircraft(tmp_path: Path) 
     assert flight.verdict.word == FAILED
     assert [one.uav for one in flight.verdict.limit_cycles] == [1, 2, 3, 4]
     assert all(1.0 < one.frequency < 6.0 for one in flight.verdict.limit_cycles)
-    run = record(flight, tmp_path / "run")
+    run = simulate(flight.mission, tmp_path / "run")
     # From the recording the same is said, and its last event says it.
     assert run.verdict == flight.verdict
     assert run.events[-1]["severity"] == "error"
