@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ftcc.groundside.feed import Feed
 from ftcc.groundside.launcher import Outcome, Swarm, automatic_pack
 from ftcc.groundside.monitor import Monitor
+from ftcc.groundside.open_files import files_needed, provide_files
 from ftcc.groundside.pace import Setup, usable_cores
 from ftcc.groundside.pacing import Pacing
 from ftcc.groundside.registry import Card, Control, Entry
@@ -158,7 +159,15 @@ def fly(
     started : called once everybody is ready, with the viewer's address or None.
 
     Ctrl-C and SIGTERM end the flight in order.
+
+    Raises
+    ------
+    TooFewFilesError
+        If processes may not open as many files as they need: nothing is started.
+    TimeoutError
+        If not all processes get ready.
     """
+    provide_files(files_needed(mission, options.pack, len(options.listeners)))
     folder = options.folder
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(mission.toml)

@@ -11,9 +11,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ftcc.groundside.errors import UserError
 from ftcc.link.ports import runtime_folder
 
-__all__ = ["Card", "Control", "Entry", "find", "running", "tell"]
+__all__ = ["Card", "Control", "Entry", "check_name", "find", "running", "tell"]
+
+
+_LONGEST_PATH = 107
+"""Of a socket, bytes."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,20 @@ def _card(name: str) -> Path:
 
 def _socket_path(name: str) -> Path:
     return runtime_folder() / f"{name}.sock"
+
+
+def check_name(name: str) -> None:
+    """Refuse a swarm's name that is taken, or too long for its sockets; it may get some more characters yet.
+
+    Raises
+    ------
+    UserError
+    """
+    room = _LONGEST_PATH - len(os.fsencode(runtime_folder())) - len("/.feed")
+    if len(os.fsencode(name)) > room:
+        raise UserError(f"a swarm called {name!r} is listed in {runtime_folder()}: its name may have {room} bytes")
+    if any(entry.name == name for entry in running()):
+        raise UserError(f"a swarm called {name!r} is running; give another folder with --out")
 
 
 def _alive(pid: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from ftcc.link.folders import runtime_folder
 __all__ = ["PortBlock", "PortError", "UavPorts", "reserve", "runtime_folder"]
 
 _FIRST, _END = 20000, 32768
+_LAST = 65535
 _PER_UAV = 6
 _SHARED = 4
 
@@ -71,6 +73,26 @@ class PortBlock:
             self.guard = None
 
 
+def _refused(error: OSError, port: int) -> OSError | None:
+    """What keeps a port from being bound, where that is not somebody who has it."""
+    if error.errno == errno.EACCES:
+        return PortError(f"port {port}: only root may have the ports below 1024")
+    return None if error.errno == errno.EADDRINUSE else error
+
+
+def _require_loopback() -> None:
+    """Refuse to begin where loopback is down: sockets can be bound there, and nothing that is sent arrives."""
+    from ftcc.link.mavlink import LOOPBACK
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((LOOPBACK, _FIRST))  # asks for the way there, sends nothing
+        except OSError as error:
+            raise PortError(
+                f"processes cannot speak by loopback ({LOOPBACK}): {error.strerror}; `ip link set lo up` starts it"
+            ) from None
+
+
 def _in_use(base: int, size: int) -> int | None:
     """A port of the block that somebody has bound, beside the guard's own."""
     from ftcc.link.mavlink import LOOPBACK  # who only lists running swarms needs no MAVLink
@@ -84,7 +106,9 @@ def _in_use(base: int, size: int) -> int | None:
                     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 try:
                     probe.bind((LOOPBACK, port))
-                except OSError:
+                except OSError as error:
+                    if refused := _refused(error, port):
+                        raise refused from None
                     return port
     return None
 
@@ -97,8 +121,10 @@ def _guard(base: int) -> socket.socket | None:
     try:
         guard.bind((LOOPBACK, base))
         guard.listen()
-    except OSError:
+    except OSError as error:
         guard.close()
+        if refused := _refused(error, base):
+            raise refused from None
         return None
     return guard
 
@@ -109,9 +135,12 @@ def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
     Raises
     ------
     PortError
-        If a port of the given block is in use (naming it), or no block is free.
+        If a port of the given block is in use (naming it) or none, no block is free, or there is no loopback.
     """
     size = PortBlock(0, tuple(uavs)).size
+    if base is not None and not 0 < base <= _LAST - size + 1:
+        raise PortError(f"port {base}: the block of {size} ports must begin from 1 to {_LAST - size + 1}")
+    _require_loopback()
     stride = -(-size // 100) * 100
     candidates = [base] if base is not None else range(_FIRST, _END - size, stride)
     for candidate in candidates:
@@ -119,7 +148,11 @@ def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
         taken: int | None = candidate
         block.guard = _guard(candidate)
         if block.guard is not None:
-            taken = _in_use(candidate, size)
+            try:
+                taken = _in_use(candidate, size)
+            except OSError:
+                block.release()
+                raise
             if taken is None:
                 return block
             block.release()

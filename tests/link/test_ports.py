@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import subprocess
@@ -121,3 +122,34 @@ def test_a_given_free_block_is_taken_as_it_is(blocks):
 
 def test_the_folder_of_running_swarms_is_private_to_the_user():
     assert runtime_folder().stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.parametrize("base", [0, -5, 65536 - 51, 1 << 64])
+def test_a_block_that_is_not_among_the_ports_is_refused(base):
+    with pytest.raises(PortError, match=f"port {base}: the block of 52 ports must begin from 1 to 65484"):
+        reserve(UAVS, base)
+
+
+def test_the_last_block_of_all_is_one(blocks):
+    block = held(blocks, UAVS, 65536 - 52)
+    assert block.base + block.size == 65536
+
+
+def unreachable(self, address):
+    raise OSError(errno.ENETUNREACH, "Network is unreachable")
+
+
+def forbidden(self, address):
+    raise PermissionError(errno.EACCES, "Permission denied")
+
+
+def test_without_loopback_nothing_begins(monkeypatch):
+    monkeypatch.setattr(socket.socket, "connect", unreachable)
+    with pytest.raises(PortError, match=r"loopback \(127.0.0.1\): Network is unreachable; `ip link set lo up`"):
+        reserve(UAVS)
+
+
+def test_ports_of_root_are_not_said_to_be_in_use(monkeypatch):
+    monkeypatch.setattr(socket.socket, "bind", forbidden)
+    with pytest.raises(PortError, match="port 80: only root"):
+        reserve(UAVS, 80)
