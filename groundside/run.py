@@ -213,14 +213,19 @@ class Run:
         }
         filled = dict.fromkeys(uavs, 0)
         everybody = np.array(list(self._rows))
+        k = len(everybody)
         for group in range(self._open.num_row_groups):
             values, whose = self._group(group, [name, "uav"])
-            # Mostly everybody has a row at every time.
-            square = len(whose) % len(everybody) == 0 and (whose.reshape(-1, len(everybody)) == everybody).all()
-            for uav in uavs:
-                own = values[list(self._rows).index(uav) :: len(everybody)] if square else values[whose == uav]
-                found[uav][filled[uav] : filled[uav] + len(own)] = own
-                filled[uav] += len(own)
+            if len(whose) % k == 0 and (whose.reshape(-1, k) == everybody).all():
+                # As it mostly is: everybody has a row at every time.
+                parts = [values[n::k] for n in range(k)]
+            else:
+                order = np.argsort(whose, kind="stable")
+                parts = np.split(values[order], np.searchsorted(whose[order], everybody[1:]))
+            for uav, part in zip(self._rows, parts, strict=True):
+                if uav in found:
+                    found[uav][filled[uav] : filled[uav] + len(part)] = part
+                    filled[uav] += len(part)
         return found
 
     def _readable(self, read: Callable[[], Any]) -> Any:

@@ -220,29 +220,35 @@ def _saturation(flight: _Flight) -> Iterator[Saturation]:
 def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
     """The worst oscillation of each UAV, in shares of what is allowed."""
     given: list[float] | None = None
-    for uav in filter(flight.lasted, flight.followers):
-        t = flight.times(uav)
-        worst, size = None, 0.0
-        for name, unit, x, floor in _oscillating(flight, uav):
-            found = oscillation(t, x, floor)
-            if found is None or found.amplitude / floor <= size:
-                continue
-            given = _given(flight) if given is None else given
-            if not is_driven(found.frequency, given):
-                worst, size = LimitCycle(name, unit, uav, *found), found.amplitude / floor
-        if worst is not None:
-            yield worst
+    worst: dict[int, tuple[float, LimitCycle]] = {}
+    for uav, name, unit, signal, floor in _oscillating(flight):
+        found = oscillation(flight.times(uav), flight.of(signal, uav), floor)
+        if found is None or (uav in worst and found.amplitude / floor <= worst[uav][0]):
+            continue
+        given = _given(flight) if given is None else given
+        if not is_driven(found.frequency, given):
+            worst[uav] = found.amplitude / floor, LimitCycle(name, unit, uav, *found)
+    for uav in flight.followers:
+        if uav in worst:
+            yield worst[uav][1]
 
 
-def _oscillating(flight: _Flight, uav: int) -> Iterator[tuple[str, str, Array, float]]:
-    """What may oscillate: name, unit, values, and the amplitude up to which it may."""
-    for actuator in _actuators(flight, uav):
-        x = flight.signals.column(f"{actuator.name}_command", uav)
-        yield actuator.name, unit_of(actuator.name), x, RIPPLE * actuator.travel
+def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
+    """What may oscillate: UAV, name, unit, column or expression, and the amplitude up to which it may.
+
+    One signal of all UAVs after the other, as a recording is read.
+    """
+    lasting = [uav for uav in flight.followers if flight.lasted(uav)]
+    actuators = {uav: {one.name: one for one in _actuators(flight, uav)} for uav in lasting}
+    for name in find(flight.mission.plant).ACTUATORS:
+        for uav in lasting:
+            if name in actuators[uav]:
+                yield uav, name, unit_of(name), f"{name}_command", RIPPLE * actuators[uav][name].travel
     for error in flight.mission.scheme.tracking:
         floor = error.bound if isinstance(error.bound, float) else ALLOWED.get(error.unit)
         if floor is not None and flight.has(error.name):
-            yield error.name, error.unit, flight.of(error.name, uav), floor
+            for uav in lasting:
+                yield uav, error.name, error.unit, error.name, floor
 
 
 def _given(flight: _Flight) -> list[float]:
@@ -255,6 +261,6 @@ def _given(flight: _Flight) -> list[float]:
     own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]
     conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
     columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in ("z", "V")]
-    columns += [(uav, name) for uav in flight.followers for name in own + conditions]
+    columns += [(uav, name) for name in own + conditions for uav in flight.followers]
     found = (oscillation(flight.times(uav), signals.column(name, uav)) for uav, name in columns)
     return [one.frequency for one in found if one is not None]
