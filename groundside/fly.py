@@ -285,8 +285,15 @@ def _conclude(flight: _Flight) -> None:
     except RunError:
         # What has been recorded cannot be read, or is nothing: the log says why.
         return
+    except OSError as error:
+        what = f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` does it once there is room"
+        flight.note(Event(-1.0, "error", f"the processes' recordings are {what}"))
+        return
     flight.swarm.outcome.verdict = verdict
-    (run.path / FILE).write_text(verdict.dumps(), encoding="utf-8")
+    try:
+        (run.path / FILE).write_text(verdict.dumps(), encoding="utf-8")
+    except OSError as error:
+        flight.note(Event(-1.0, "error", f"{FILE} could not be written: {error.strerror}"))
     flight.log.write(run.end, verdict.text, severity=verdict.severity)
     flight.station.note(Event(run.end, verdict.severity, verdict.text))
     if not flight.station.complete:

@@ -363,5 +363,7 @@ def _concluded(mission: Mission, folder: Path, last: float, flight: Flight) -> R
     run.verdict = judge(run, mission, flight.lost)
     events.write(last, run.verdict.text, severity=run.verdict.severity)
     events.close()
+    if events.trouble:
+        raise OSError(f"{events.path}: {events.trouble}")
     (folder / FILE).write_text(run.verdict.dumps(), encoding="utf-8")
     return run
