@@ -170,7 +170,8 @@ def fly(
     provide_files(files_needed(mission, options.pack, len(options.listeners)))
     folder = options.folder
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "scenario.toml").write_text(mission.toml)
+    run_started = time.time()
+    (folder / "scenario.toml").write_text(mission.toml_of_run(run_started), encoding="utf-8")
     flight: _Flight
 
     def on_event(event: Event) -> None:
@@ -194,9 +195,8 @@ def fly(
     signals = [signal_.name for signal_ in mission.scheme.signals]
     uavs = [spec.uav for spec in mission.vehicles]
     sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
-    station = Monitor(
-        ports.station, sources, uavs, mission.plant, signals, folder / "telemetry.tlog", options.id_offset
-    )
+    tlog = folder / "telemetry.tlog"
+    station = Monitor(ports.station, sources, uavs, mission.plant, signals, tlog, options.id_offset, run_started)
     log = EventLog(folder / "events.jsonl")
     asked = None if math.isinf(options.speed) else options.speed
     setup = Setup(asked, len(uavs), options.pack, automatic_pack(len(uavs)), usable_cores())

@@ -8,6 +8,7 @@ import math
 import platform
 import tomllib
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from types import ModuleType
 
 import tomli_w
@@ -91,6 +92,10 @@ class Mission:
     def uavs(self) -> tuple[int, ...]:
         """Ids, in the order of the specs."""
         return self.graph.uavs
+
+    def toml_of_run(self, started: float) -> str:
+        """``toml`` with the Unix time (s) at which a run of it started: what stands in that run's folder."""
+        return f"{self.toml}\n[flown.run]\nstarted = {datetime.fromtimestamp(started, UTC).isoformat()}\n"
 
     def with_seed(self, seed: int) -> Mission:
         """The same mission with other random numbers: noise, links, gusts and turbulence."""

@@ -24,7 +24,11 @@ from ftcc.sim.process import truth_array
 __all__ = ["Monitor"]
 
 _STAMP = struct.Struct(">Q")
-"""What a .tlog has before each message: when it came, us."""
+"""What a .tlog has before each message: its Unix time, us."""
+_LINK = 0b11
+"""The bits of a stamp in which MAVProxy keeps the number of a link."""
+_LONGEST_US = 10**11
+"""No flight lasts longer: a later stamp is none."""
 
 
 @dataclass(slots=True)
@@ -41,7 +45,9 @@ class _Heard:
 class Monitor:
     """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given.
 
-    It believes what comes from the ports in ``sources`` alone. Systems are UAVs' ids and ``id_offset``.
+    It believes what comes from the ports in ``sources`` alone. Systems are UAVs' ids and ``id_offset``. The log has as
+    times ``started`` (Unix time, s) and the newest simulated time told: replayed, it lasts as long as the flight, as
+    fast as that was flown and however long it was held, and no step of the clock reaches it.
     """
 
     def __init__(
@@ -53,6 +59,7 @@ class Monitor:
         signals: Sequence[str],
         log: Path | None = None,
         id_offset: int = 0,
+        started: float | None = None,
     ) -> None:
         self._ear = Ear(port, sources)
         self._uavs = {uav: _Heard() for uav in uavs}
@@ -60,6 +67,8 @@ class Monitor:
         self._late = truth_array(plant).index("late")
         self._read_state = _state_reader(find(plant), truth_array(plant), signals)
         self._log = log.open("ab") if log else None
+        self._started_us = int((time.time() if started is None else started) * 1e6)
+        self._told_us = 0
         self._events: list[Event] = []
         self.t = 0.0
         """Newest simulated time heard, s."""
@@ -79,7 +88,10 @@ class Monitor:
         """Take in all telemetry that has arrived."""
         for told in self._ear.hear():
             if self._log and told:
-                stamp = _STAMP.pack(time.time_ns() // 1000)
+                newest = max(one.stamp_us for one in told)
+                if self._told_us < newest <= _LONGEST_US:
+                    self._told_us = newest
+                stamp = _STAMP.pack((self._started_us + self._told_us) & ~_LINK)
                 self._log.write(b"".join([part for one in told for part in (stamp, one.frame)]))
             for one in told:
                 heard = self._of_system.get(one.system)

@@ -130,6 +130,16 @@ class Run:
         return resolve(self.scenario)
 
     @property
+    def started(self) -> float:
+        """Unix time (s) at which the run started, and simulated time 0 in exported tracks; of a run of an earlier
+        version, when its folder was begun.
+        """
+        flown = self.scenario.plan.flown
+        if flown is not None and flown.run is not None:
+            return flown.run.started.timestamp()
+        return (self.path / "scenario.toml").stat().st_mtime
+
+    @property
     def events(self) -> list[dict[str, Any]]:
         """What happened, in order of simulated time: t, uav, severity, text."""
         return read_events(self.path / "events.jsonl")

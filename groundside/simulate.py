@@ -10,6 +10,7 @@ import contextlib
 import functools
 import signal
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -345,7 +346,7 @@ def simulate(
 
 def _concluded(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
     """The run of a flight whose signals up to ``last`` (s) are in ``folder``: with scenario, events and verdict."""
-    (folder / "scenario.toml").write_text(mission.toml, encoding="utf-8")
+    (folder / "scenario.toml").write_text(mission.toml_of_run(time.time()), encoding="utf-8")
     events = EventLog(folder / "events.jsonl")
     for t, uav, severity, text in mission.events:
         if t <= last:

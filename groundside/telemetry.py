@@ -42,7 +42,7 @@ class Told(NamedTuple):
     name: str = ""
     """Of a DEBUG_FLOAT_ARRAY."""
     stamp_us: int = 0
-    """Its time."""
+    """Its simulated time; 0 where it tells none."""
     values: tuple[float, ...] = ()
     """Its numbers; the custom mode of a HEARTBEAT. Nothing of other messages."""
 
@@ -99,9 +99,10 @@ def _told(message: Any) -> Told:
     system, kind, frame = message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf())
     if kind == HEARTBEAT:
         return Told(system, kind, frame, values=(message.custom_mode,))
+    stamp = getattr(message, "time_usec", 1000 * getattr(message, "time_boot_ms", 0))
     if kind == ARRAY:
-        return Told(system, kind, frame, message.name, message.time_usec, tuple(message.data))
-    return Told(system, kind, frame)
+        return Told(system, kind, frame, message.name, stamp, tuple(message.data))
+    return Told(system, kind, frame, stamp_us=stamp)
 
 
 def _read(datagram: bytes) -> list[Told] | None:
@@ -147,6 +148,8 @@ def _known(message: Any, read: Callable[[int, int, bytes, bytes], Told | None]) 
 
 _STATE = struct.Struct("<I6f")
 """ATTITUDE and LOCAL_POSITION_NED."""
+_HUD = struct.Struct("<4f")
+"""The floats of VFR_HUD, which it begins with."""
 _ARRAY = struct.Struct("<QH10s58f")
 
 
@@ -155,11 +158,25 @@ def _heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> Told:
 
 
 def _state(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
-    return Told(system, kind, frame) if math.isfinite(sum(_STATE.unpack(payload))) else None
+    stamp, *values = _STATE.unpack(payload)
+    return Told(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
 
 
-def _integers(system: int, kind: int, frame: bytes, _payload: bytes) -> Told:
+def _hud(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
+    return Told(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
+
+
+def _unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> Told:
     return Told(system, kind, frame)
+
+
+def _with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], Told]:
+    """What reads whole numbers that begin with their time, of so many octets and us a unit."""
+
+    def read(system: int, kind: int, frame: bytes, payload: bytes) -> Told:
+        return Told(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
+
+    return read
 
 
 def _array(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
@@ -173,9 +190,13 @@ def _array(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
 _KNOWN = dict(
     [
         _known(dialect.MAVLink_heartbeat_message, _heartbeat),
-        _known(dialect.MAVLink_sys_status_message, _integers),
+        _known(dialect.MAVLink_sys_status_message, _unstamped),
         _known(dialect.MAVLink_attitude_message, _state),
         _known(dialect.MAVLink_local_position_ned_message, _state),
+        _known(dialect.MAVLink_global_position_int_message, _with_stamp(4, 1000)),
+        _known(dialect.MAVLink_gps_raw_int_message, _with_stamp(8, 1)),
+        _known(dialect.MAVLink_vfr_hud_message, _hud),
+        _known(dialect.MAVLink_servo_output_raw_message, _with_stamp(4, 1)),
         _known(dialect.MAVLink_debug_float_array_message, _array),
     ]
 )

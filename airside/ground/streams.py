@@ -21,6 +21,7 @@ __all__ = [
     "ON_REQUEST",
     "SLOWEST",
     "STREAMS",
+    "Rates",
     "Schedule",
     "Stream",
     "heartbeat",
@@ -260,22 +261,24 @@ class Stream(NamedTuple):
     rate: float
     """Hz of simulated time, towards a ground station, unless asked otherwise; 0 = only when asked."""
     to_station: float
-    """Hz towards the swarm's own station, which records everything."""
+    """Hz towards the swarm's own station, which logs everything."""
     make: Callable[[Seat], Any]
     followers_only: bool = False
+    logged: float = 0.0
+    """Hz of simulated time that the station has at least, also where the swarm flies faster than the clock."""
 
 
 STREAMS = (
-    Stream("ATTITUDE", _M.MAVLINK_MSG_ID_ATTITUDE, 10.0, 10.0, _attitude),
+    Stream("ATTITUDE", _M.MAVLINK_MSG_ID_ATTITUDE, 10.0, 5.0, _attitude),
     Stream("ATT_QUAT", _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, 0.0, 0.0, _attitude_quaternion),
-    Stream("LOCAL_POS", _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 10.0, 10.0, _local_position),
-    Stream("GLOBAL_POS", _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5.0, 0.0, _global_position),
-    Stream("GPS_RAW", _M.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0, 0.0, _gps_raw),
-    Stream("VFR_HUD", _M.MAVLINK_MSG_ID_VFR_HUD, 5.0, 0.0, _vfr_hud),
+    Stream("LOCAL_POS", _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 10.0, 2.0, _local_position),
+    Stream("GLOBAL_POS", _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5.0, 5.0, _global_position, logged=1.0),
+    Stream("GPS_RAW", _M.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0, 1.0, _gps_raw),
+    Stream("VFR_HUD", _M.MAVLINK_MSG_ID_VFR_HUD, 5.0, 2.0, _vfr_hud),
     Stream("SYS_STATUS", _M.MAVLINK_MSG_ID_SYS_STATUS, 1.0, 1.0, _sys_status),
     Stream("EXT_STATE", _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 1.0, 0.0, _extended_state),
     Stream("SYS_TIME", _M.MAVLINK_MSG_ID_SYSTEM_TIME, 1.0, 0.0, _system_time),
-    Stream("SERVOS", _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0, 0.0, _servos),
+    Stream("SERVOS", _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2.0, 2.0, _servos),
     Stream("ATT_TARGET", _M.MAVLINK_MSG_ID_ATTITUDE_TARGET, 2.0, 0.0, _attitude_target),
     Stream("POS_TARGET", _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED, 2.0, 0.0, _position_target),
     Stream("SIGNALS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 10.0, _signals, followers_only=True),
@@ -285,12 +288,23 @@ STREAMS = (
 """Everything that flows of itself, beside HEARTBEAT."""
 
 
-def rates_of(seat: Seat, station: bool) -> list[float]:
-    """Rates in the order of `STREAMS`, Hz, towards a ground station or the swarm's own."""
-    return [
-        0.0 if stream.followers_only and seat.leader else stream.to_station if station else stream.rate
-        for stream in STREAMS
-    ]
+class Rates(list[float]):
+    """Rates in the order of `STREAMS`, Hz; ``least`` of them in simulated time alone, however fast that goes by."""
+
+    def __init__(self, rates: Iterable[float], least: Iterable[float] = ()) -> None:
+        super().__init__(rates)
+        self.least = tuple(least) or (0.0,) * len(self)
+
+
+def rates_of(seat: Seat, station: bool) -> Rates:
+    """Rates towards a ground station or the swarm's own."""
+    had = [not (stream.followers_only and seat.leader) for stream in STREAMS]
+    if not station:
+        return Rates(stream.rate * one for stream, one in zip(STREAMS, had, strict=True))
+    return Rates(
+        [stream.to_station * one for stream, one in zip(STREAMS, had, strict=True)],
+        [stream.logged for stream in STREAMS],
+    )
 
 
 def _autopilot_version(seat: Seat) -> Any:
@@ -332,15 +346,23 @@ def requested(seat: Seat, message: int) -> list[Any]:
 
 
 class Schedule:
-    """When which stream is due towards one peer: at its rate in simulated or in wall time, whichever is slower."""
+    """When which stream is due towards one peer: at its rate in simulated or in wall time, whichever is slower.
+
+    Streams with a least rate (see `Rates`) are due at that rate in simulated time, too.
+    """
 
     def __init__(self, rates: Iterable[float]) -> None:
         self._rates = list(rates)
+        self._least = rates.least if isinstance(rates, Rates) else (0.0,) * len(self._rates)
         self._last_us = [-(10**12)] * len(self._rates)
         self._last_wall = [-math.inf] * len(self._rates)
         self._next_us = 0
         self._next_wall = 0.0
         """Nothing is due before these times, simulated us and wall s (monotonic)."""
+        self._looked = (0, 0.0)
+        """When what is due was looked for, simulated us and wall s."""
+        self._pace = 0.0
+        """Where simulated time is to be kept and not the wall clock, wall s per simulated us; otherwise 0."""
 
     @property
     def next_us(self) -> int:
@@ -363,23 +385,44 @@ class Schedule:
 
     def due(self, now_us: int) -> list[int]:
         """The streams that are due at this tick."""
-        if now_us < self._next_us:
+        if now_us < self._next_us and not self._pace:
             return []
         wall = time.monotonic()
-        if wall < self._next_wall:
+        if now_us < self._next_us:
+            self._next_wall = wall + (self._next_us - now_us) * self._pace
+            return []
+        if wall < self._next_wall and not self._pace:
             return []
         found = []
         self._next_us, self._next_wall = now_us + 1_000_000, wall + 1.0
+        least_us = now_us + 10**12
         for n, rate in enumerate(self._rates):
             if rate <= 0.0:
                 continue
             interval_us = 1e6 / rate
             behind = now_us - self._last_us[n]
-            if behind >= _SLACK * interval_us and wall - self._last_wall[n] >= _SLACK / rate:
+            least = 0.0 < self._least[n] < rate
+            soon = wall - self._last_wall[n] < _SLACK / rate
+            if soon and least:
+                interval_us = 1e6 / self._least[n]
+            if behind >= _SLACK * interval_us and (not soon or least):
                 # On the grid of the rate, so that a tick's length does not add up.
                 self._last_us[n] += int(behind // interval_us * interval_us) or int(interval_us)
                 self._last_wall[n] = wall
                 found.append(n)
-            self._next_us = min(self._next_us, max(now_us, int(self._last_us[n] + _SLACK * interval_us)))
+            self._next_us = min(self._next_us, max(now_us, int(self._last_us[n] + _SLACK * 1e6 / rate)))
             self._next_wall = min(self._next_wall, self._last_wall[n] + _SLACK / rate)
+            if least:
+                least_us = min(least_us, int(self._last_us[n] + _SLACK * 1e6 / self._least[n]))
+        self._hurry(now_us, wall, least_us)
         return found
+
+    def _hurry(self, now_us: int, wall: float, least_us: int) -> None:
+        """Be due at ``least_us`` where simulated time, as fast as it goes by now, comes there before the wall clock."""
+        looked_us, looked = self._looked
+        self._looked = now_us, wall
+        pace = (wall - looked) / max(now_us - looked_us, 1)
+        hurries = wall + (least_us - now_us) * pace < self._next_wall
+        self._pace = pace if hurries else 0.0
+        if hurries:
+            self._next_us, self._next_wall = least_us, wall + (least_us - now_us) * pace

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 from ftcc.groundside.schema.aircraft import Plant, Starts
 from ftcc.groundside.schema.base import Id, Strict
@@ -80,6 +80,12 @@ class Claim(Strict):
         return self
 
 
+class FlownRun(Strict):
+    """The run that recorded a scenario."""
+
+    started: AwareDatetime = Field(description="simulated time 0 in exported tracks and logs")
+
+
 class Flown(Strict):
     """How a scenario that a run recorded came about."""
 
@@ -88,6 +94,7 @@ class Flown(Strict):
     variants: list[str] = []
     settings: list[str] = []
     versions: dict[str, str] = {}
+    run: FlownRun | None = None
 
 
 class Plan(Strict):
