@@ -272,8 +272,8 @@ STREAMS = (
     Stream("ATTITUDE", _M.MAVLINK_MSG_ID_ATTITUDE, 10.0, 5.0, _attitude),
     Stream("ATT_QUAT", _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, 0.0, 0.0, _attitude_quaternion),
     Stream("LOCAL_POS", _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 10.0, 2.0, _local_position),
-    Stream("GLOBAL_POS", _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5.0, 5.0, _global_position, logged=1.0),
     Stream("GPS_RAW", _M.MAVLINK_MSG_ID_GPS_RAW_INT, 2.0, 1.0, _gps_raw),
+    Stream("GLOBAL_POS", _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5.0, 5.0, _global_position, logged=1.0),
     Stream("VFR_HUD", _M.MAVLINK_MSG_ID_VFR_HUD, 5.0, 2.0, _vfr_hud),
     Stream("SYS_STATUS", _M.MAVLINK_MSG_ID_SYS_STATUS, 1.0, 1.0, _sys_status),
     Stream("EXT_STATE", _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, 1.0, 0.0, _extended_state),
@@ -285,7 +285,7 @@ STREAMS = (
     Stream("LINKS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 1.0, 10.0, _links),
     Stream("HOME", _M.MAVLINK_MSG_ID_HOME_POSITION, 0.5, 0.0, _home_position),
 )
-"""Everything that flows of itself, beside HEARTBEAT."""
+"""Everything that flows of itself, beside HEARTBEAT, in the order in which it is sent: a fix before positions."""
 
 
 class Rates(list[float]):

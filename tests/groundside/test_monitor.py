@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink import mavutil
 
 from ftcc.groundside.monitor import Monitor
 from ftcc.groundside.snapshot import LinkState
@@ -59,7 +60,11 @@ def as_pymavlink_reads(datagram: bytes) -> list[Told]:
         if read.kind == HEARTBEAT:
             read = read._replace(values=(message.custom_mode,))
         if read.kind == ARRAY:
-            read = read._replace(name=message.name, stamp_us=message.time_usec, values=tuple(message.data))
+            read = read._replace(name=message.name, values=tuple(message.data))
+        if hasattr(message, "time_boot_ms"):
+            read = read._replace(stamp_us=message.time_boot_ms * 1000)
+        if hasattr(message, "time_usec"):
+            read = read._replace(stamp_us=message.time_usec)
         told.append(read)
     return told
 
@@ -81,6 +86,9 @@ def some_message(draw: random.Random) -> Any:
             dialect.MAVLink_debug_float_array_message(stamp * 1000, name, draw.randrange(9), floats),
             dialect.MAVLink_statustext_message(4, b"stall"),
             dialect.MAVLink_vfr_hud_message(*floats[:2], 90, 50, *floats[2:4]),
+            dialect.MAVLink_global_position_int_message(stamp, 473977000, -85456000, 1000000, 0, 3000, 0, 0, 9000),
+            dialect.MAVLink_gps_raw_int_message(stamp * 1000, 3, 473977000, 85456000, 0, 100, 100, 3000, 0, 12),
+            dialect.MAVLink_servo_output_raw_message(stamp, 0, *[1000 + draw.randrange(1000)] * 4, 0, 0, 0, 0),
         )
     )
 
@@ -142,8 +150,19 @@ def test_what_comes_again_and_again_does_not_need_pymavlink(ear: Ear, monkeypatc
         float_array(1000, "links", [2.0, 0.05, 7.0, 1.0, 0.0]),
         dialect.MAVLink_sys_status_message(1, 1, 1, 0, 65535, -1, 100, 0, 0, 0, 0, 0, 0),
         dialect.MAVLink_heartbeat_message(1, 12, 129, custom_mode(MISSION), 4, 3),
+        dialect.MAVLink_global_position_int_message(1, 473977000, 85456000, 1000000, 0, 3000, 0, 0, 9000),
+        dialect.MAVLink_gps_raw_int_message(1000, 3, 473977000, 85456000, 0, 100, 100, 3000, 0, 12),
+        dialect.MAVLink_vfr_hud_message(30.0, 30.0, 90, 50, 1000.0, 0.0),
+        dialect.MAVLink_servo_output_raw_message(1000, 0, 1500, 1500, 1500, 1200, 0, 0, 0, 0),
     )
-    assert [told.system for told in ear.read(datagram)] == [5] * 6
+    assert [told.system for told in ear.read(datagram)] == [5] * 10
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_display_that_is_not_finite_is_refused(ear: Ear, value: float) -> None:
+    message = dialect.MAVLink_vfr_hud_message(30.0, value, 90, 50, 1000.0, 0.0)
+    datagram = message.pack(dialect.MAVLink(None, 5, 1))
+    assert ear.read(datagram) == as_pymavlink_reads(datagram) == []
 
 
 def test_the_swarm_as_it_was_told(station: Monitor, pilot: socket.socket) -> None:
@@ -197,6 +216,24 @@ def test_the_log_holds_the_messages_as_they_came(station: Monitor, pilot: socket
         assert stamp > 1.7e15
         frames, logged = frames + logged[8 : 8 + length], logged[8 + length :]
     assert frames == b"".join(sent)
+
+
+def test_the_log_is_stamped_with_simulated_time_that_never_goes_back(pilot: socket.socket, tmp_path: Path) -> None:
+    log = tmp_path / "stamped.tlog"
+    station = Monitor(0, {pilot.getsockname()[1]}, (1, 2), PLANT, SIGNALS, log, started=1.8e9)
+    pilot.connect(station._ear._socket.getsockname())
+    state = [0.1] * 6
+    # The second to last has been told a tick earlier, the last is beyond every flight.
+    for ms in (0, 40, 1000, 990, 2**32 - 1):
+        heartbeat = dialect.MAVLink_heartbeat_message(1, 12, 129, custom_mode(MISSION), 4, 3)
+        pilot.send(Codec(1, 1).pack(heartbeat, dialect.MAVLink_attitude_message(ms, *state)))
+        station.read()
+    station.close()
+    read = mavutil.mavlink_connection(str(log))
+    stamps = []
+    while (message := read.recv_match(type=["HEARTBEAT", "ATTITUDE"])) is not None:
+        stamps.append(message._timestamp - 1.8e9)
+    assert stamps == pytest.approx([0.0, 0.0, 0.04, 0.04, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], abs=1e-5)
 
 
 def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
