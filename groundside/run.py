@@ -313,6 +313,35 @@ class Run:
             table = table.sort_by([("t", "ascending"), ("uav", "ascending"), ("sender", "ascending")])
         return {name: table.column(name).to_numpy() for name in table.column_names}
 
+    def export(self, kind: str, target: Path) -> list[Path]:
+        """Write the recording as "csv", "mat", "kml" or "gpx" into a file, as "ulog" into a folder; what was written.
+
+        Raises
+        ------
+        RunError
+            If nothing was recorded.
+        OSError
+            If it cannot be written.
+        """
+        from ftcc.groundside import tracks
+
+        if kind == "ulog":
+            from ftcc.groundside.ulog import write_ulogs
+
+            return write_ulogs(self, target)
+        match kind:
+            case "csv":
+                self.export_csv(target)
+            case "mat":
+                self.export_mat(target)
+            case "kml":
+                tracks.write_kml(self, target)
+            case "gpx":
+                tracks.write_gpx(self, target)
+            case _:
+                raise ValueError(f"unknown kind of file: {kind!r}")
+        return [target]
+
     def export_csv(self, file: Path) -> None:
         """Write the recording as comma-separated values, names in the first line."""
         import pyarrow.csv as pc

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -15,31 +14,11 @@ from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.channel import Channel, Inbox
 from ftcc.link.gate import Said
+from ftcc.link.home import Home
 from ftcc.link.mavlink import Endpoint
 from ftcc.link.process import Setting
 
 __all__ = ["Home", "Seat"]
-
-_EARTH = 6_378_137.0
-"""Radius, m."""
-
-
-@dataclass(frozen=True)
-class Home:
-    """Where on earth the origin of the swarm's local frame lies, so that maps have something to show."""
-
-    latitude: float
-    """deg."""
-    longitude: float
-    """deg."""
-    altitude: float
-    """m above mean sea level at z = 0."""
-
-    def place(self, north: float, east: float) -> tuple[int, int]:
-        """Latitude and longitude (1e-7 deg) of a point of the local frame (m), on a sphere, near the origin."""
-        latitude = self.latitude + math.degrees(north / _EARTH)
-        longitude = self.longitude + math.degrees(east / (_EARTH * math.cos(math.radians(self.latitude))))
-        return round(max(-90.0, min(90.0, latitude)) * 1e7), round((longitude + 180.0) % 360.0 * 1e7) - 1_800_000_000
 
 
 @dataclass

@@ -17,6 +17,9 @@ def report(
     json: Annotated[bool, typer.Option("--json", help="Print verdict and claims as JSON.")] = False,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
     mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
+    kml: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the tracks for Google Earth.")] = None,
+    gpx: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the tracks as GPX.")] = None,
+    ulog: Annotated[Path | None, typer.Option(metavar="DIR", help="Export a ULog file per UAV, as PX4 logs.")] = None,
     page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
     strict: Strict = False,
 ) -> None:
@@ -27,11 +30,12 @@ def report(
     from ftcc.groundside.run import NothingRecordedError, Run, RunError
 
     recorded = Run(run)
+    exports = {"csv": csv, "mat": mat, "kml": kml, "gpx": gpx, "ulog": ulog}
     written = terminal(stderr=True)
     try:
         results = claims_of(recorded)
     except NothingRecordedError as error:
-        if json or csv or mat:
+        if json or any(exports.values()):
             raise
         warn(str(error))
         if page:
@@ -41,13 +45,13 @@ def report(
         print(as_json(recorded, results))
     else:
         show(terminal(), recorded, results)
-    for option, file, export in (("--csv", csv, recorded.export_csv), ("--mat", mat, recorded.export_mat)):
+    for kind, file in exports.items():
         if file is not None:
             try:
-                export(file)
+                made = recorded.export(kind, file)
             except OSError as error:
-                raise RunError(f"{option} {file}: cannot be written: {error.strerror or error}") from None
-            written.print(f"wrote {file}", highlight=False, soft_wrap=True)
+                raise RunError(f"--{kind} {file}: cannot be written: {error.strerror or error}") from None
+            written.print(f"wrote {', '.join(map(str, made))}", highlight=False, soft_wrap=True)
     if page and not json:
         written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
     if strict:
