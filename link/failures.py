@@ -6,7 +6,7 @@ and the navigation solution that it sends.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ __all__ = [
     "failure_answer",
     "failure_messages",
     "meaning_of",
+    "parts_of",
     "read_failure",
 ]
 
@@ -138,6 +139,18 @@ _RADIO = Unit(
 
 UNITS = {"servo": _SERVO, "motor": _MOTOR, "gps": _GPS, "gyro": _GYRO, "radio": _RADIO}
 """Units by our names."""
+
+
+def parts_of(unit: Unit, actuators: Collection[str]) -> dict[int, str]:
+    """The instances of a ``unit`` of aircraft with these ``actuators``, by number: what takes an actuator's place counts.
+
+    Empty where the unit is no actuator, or where the aircraft have none of it.
+    """
+    # It loads numba, which who only asks for a failure does not need.
+    from ftcc.link.actuators import SLOT
+
+    named = {SLOT[actuator]: actuator for actuator in actuators}
+    return {n: named[SLOT[part]] for n, part in enumerate(unit.parts, 1) if SLOT[part] in named}
 
 
 class Meaning(NamedTuple):

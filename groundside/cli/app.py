@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, fly, ground, results, scenarios, study, view
+from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.errors import UserError
 from ftcc.link.folders import NoFolderError
@@ -37,7 +37,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         ground.vehicles,
         ground.fault,
         ground.repair,
-        ground.failures,
+        failures.failures,
         ground.commands,
         ground.link,
         ground.ftc,

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = [
     "attitude",
     "commands",
-    "failures",
     "fault",
     "ftc",
     "keys",
@@ -109,26 +108,6 @@ def commands() -> None:
     out.print("\nAny other command is answered UNSUPPORTED. Messages:\n", highlight=False)
     out.print(heard)
     out.print("\nAny other message is left alone.", highlight=False)
-
-
-def failures() -> None:
-    """List everything that can be made to fail, and what MAV_CMD_INJECT_FAILURE means here."""
-    from rich.table import Table
-
-    from ftcc.link.failures import FAILURES, KINDS, SIZES
-
-    table = Table("unit", "instance", "type", "means", "size from", box=None)
-    for one in FAILURES:
-        unit, kind = f"{one.unit.code} {one.unit.name}", f"{KINDS[one.kind]} {one.kind.upper()}"
-        table.add_row(unit, one.unit.instances, kind, one.text, " ".join(one.sizes))
-    sizes = Table("parameter", "default", "range", "unit", "means", box=None)
-    for size in SIZES:
-        sizes.add_row(size.name, f"{size.default:g}", f"{size.low:g} .. {size.high:g}", size.unit, size.meaning)
-    out = terminal()
-    out.print(table)
-    out.print()
-    out.print(sizes)
-    out.print("\nThey act at parameter FTCC_AT (simulated ms, 0 = at once), if SYS_FAILURE_EN is 1.", highlight=False)
 
 
 def fault(

@@ -16,6 +16,7 @@ from ftcc.link.failures import (
     UNITS,
     failure_messages,
     meaning_of,
+    parts_of,
     read_failure,
 )
 from ftcc.link.mavlink import as_typed
@@ -73,3 +74,18 @@ def test_other_messages_are_no_failure():
     other = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     assert read_failure([]) == (None, 0)
     assert read_failure([other, other]) == (None, 0)
+
+
+@pytest.mark.parametrize(
+    ("actuators", "servos"),
+    [
+        (("thrust", "elevator"), {2: "elevator"}),
+        (("thrust", "elevator", "aileron", "rudder"), {1: "aileron", 2: "elevator", 3: "rudder"}),
+        (("thrust", "load_factor", "bank"), {1: "bank", 2: "load_factor"}),
+        (("elevator",), {2: "elevator"}),
+    ],
+)
+def test_an_aircraft_has_the_parts_that_it_is_steered_by(actuators, servos):
+    assert parts_of(UNITS["servo"], actuators) == servos
+    assert parts_of(UNITS["motor"], actuators) == ({1: "thrust"} if "thrust" in actuators else {})
+    assert parts_of(UNITS["gps"], actuators) == {}
