@@ -142,9 +142,9 @@ UNITS = {"servo": _SERVO, "motor": _MOTOR, "gps": _GPS, "gyro": _GYRO, "radio": 
 
 
 def parts_of(unit: Unit, actuators: Collection[str]) -> dict[int, str]:
-    """The instances of a ``unit`` of aircraft with these ``actuators``, by number: what takes an actuator's place counts.
+    """The instances of a ``unit`` that aircraft with these ``actuators`` have: number and name.
 
-    Empty where the unit is no actuator, or where the aircraft have none of it.
+    What takes a surface's place counts. Empty where the unit is no actuator, or where the aircraft have none of it.
     """
     # It loads numba, which who only asks for a failure does not need.
     from ftcc.link.actuators import SLOT

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import errno
+import os
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, view
 from ftcc.groundside.cli.common import fail, warn
+from ftcc.groundside.cli.examples import EXAMPLES
+from ftcc.groundside.cli.version import show_versions
 from ftcc.groundside.errors import UserError
 from ftcc.link.folders import NoFolderError
 
@@ -54,21 +57,32 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
 }
 
 
-class _LightHelp:
-    """A command whose ``--help`` is a plain flag: typer would load pydantic to find that it was not given."""
+class _Help:
+    """Help that ends with an example."""
 
     def get_help_option(self, ctx: Any) -> Any:
+        """A plain flag: typer would load pydantic to find that it was not given."""
         option = super().get_help_option(ctx)  # type: ignore[misc]
         if option is not None:
             option.default = False
         return option
 
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """The command's example, whole on its line: to be copied."""
+        path = " ".join(("ftcc", *ctx.command_path.split()[1:]))
+        if path in EXAMPLES:
+            formatter.write(f"\nExample:\n  {EXAMPLES[path]}\n")
 
-class _Command(_LightHelp, TyperCommand):
+
+class _Command(_Help, TyperCommand):
     """A command of ours."""
 
 
-class _Sections(_LightHelp, TyperGroup):
+class _Group(_Help, TyperGroup):
+    """A command that has commands of its own."""
+
+
+class _Sections(_Help, TyperGroup):
     """Help that lists the commands by section."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -95,13 +109,40 @@ app = typer.Typer(
 for _title, _commands in _SECTIONS.items():
     for _command in _commands:
         if isinstance(_command, typer.Typer):
-            app.add_typer(_command, rich_help_panel=_title)
+            for _sub in _command.registered_commands:
+                _sub.cls = _Command
+            app.add_typer(_command, cls=_Group, rich_help_panel=_title)
         else:
             app.command(_command.__name__.removesuffix("_all"), cls=_Command, rich_help_panel=_title)(_command)
 
 
+@app.callback(invoke_without_command=True)
+def _ftcc(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show versions: of ftcc and of what it rests on.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="With --version: as JSON.")] = False,
+    no_color: Annotated[bool, typer.Option("--no-color", help="Print without colours, as with NO_COLOR=1.")] = False,
+) -> None:
+    if no_color:
+        # Every console asks for it, in whatever process.
+        os.environ["NO_COLOR"] = "1"
+    if json and not version:
+        fail("--json: belongs to --version here; a command that has it takes it behind its name")
+    if version:
+        if ctx.invoked_subcommand is not None:
+            fail(f"--version: takes no command, here {ctx.invoked_subcommand}")
+        show_versions(json)
+    elif ctx.invoked_subcommand is None:
+        fail("a command is missing: `ftcc --help` lists them")
+
+
 def main() -> None:
     """Entry point: bad input, and no room or right to write, end with one message and exit code 2."""
+    if "_FTCC_COMPLETE" in os.environ:
+        # What knows the shells costs a start, and Typer's own options to install it two lines of help.
+        from typer.completion import completion_init  # type: ignore[attr-defined]
+
+        completion_init()
     warnings.showwarning = lambda message, *_, **__: warn(str(message))
     try:
         app()

@@ -35,6 +35,7 @@ __all__ = [
     "load_mission",
     "load_scenario",
     "new_run_folder",
+    "scenario_names",
     "show_claims",
     "show_summary",
     "speed_factor",
@@ -42,8 +43,21 @@ __all__ = [
     "warn",
 ]
 
+
+def scenario_names(incomplete: str) -> list[str]:
+    """The shipped scenarios that begin so, for the shell's completion."""
+    from ftcc.groundside.catalogue import shipped
+
+    return [name for name in shipped() if name.startswith(incomplete)]
+
+
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A shipped scenario's name, a TOML file, or a run to fly again.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A shipped scenario's name, a TOML file, or a run to fly again.",
+        autocompletion=scenario_names,
+    ),
 ]
 Form = Annotated[str | None, typer.Option(help="Form of the control law; default: the scenario's first.")]
 Variants = Annotated[str, typer.Option("--variant", metavar="A,B", help="Variants of the scenario.")]
@@ -66,14 +80,16 @@ _PIPE_WIDTH = 200
 
 def terminal(stderr: bool = False) -> Console:
     """Standard output, or standard error."""
-    from rich.console import Console
+    from ftcc.groundside.cli.narrow import Terminal
 
     stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, width=None if stream.isatty() else _PIPE_WIDTH)
+    return Terminal(stderr=stderr, width=None if stream.isatty() else _PIPE_WIDTH)
 
 
 def _say(text: str, style: str) -> None:
-    terminal(stderr=True).print(text, style=style, markup=False, highlight=False, soft_wrap=True)
+    out = terminal(stderr=True)
+    # On a terminal between words; whole where it goes into a file.
+    out.print(text, style=style, markup=False, highlight=False, soft_wrap=not out.is_terminal)
 
 
 def warn(text: str) -> None:

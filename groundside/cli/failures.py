@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli.common import Form, Settings, Variants, fail, load_mission, terminal
+from ftcc.groundside.cli.common import Form, Settings, Variants, fail, load_mission, scenario_names, terminal
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -20,7 +20,11 @@ __all__ = ["failures"]
 def failures(
     scenario: Annotated[
         str | None,
-        typer.Argument(metavar="[SCENARIO]", help="What its aircraft have alone; without: which aircraft have what."),
+        typer.Argument(
+            metavar="[SCENARIO]",
+            help="What its aircraft have alone; without: which aircraft have what.",
+            autocompletion=scenario_names,
+        ),
     ] = None,
     form: Form = None,
     variant: Variants = "",

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
@@ -26,8 +25,10 @@ from ftcc.groundside.cli.common import (
     judged,
     load_mission,
     new_run_folder,
+    scenario_names,
     show_claims,
     speed_factor,
+    terminal,
     warn,
 )
 
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["doctor", "fly", "ps", "stop"]
 
-console = Console()
 _FLIGHT_FAILED = 1
 _LAST_SYSTEM = 239
 """Greatest MAVLink system id of a UAV."""
@@ -101,7 +101,10 @@ def _check_systems(greatest: int, id_offset: int) -> None:
 
 
 def fly(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario or the path of a TOML file.")] = "demo",
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A shipped scenario or the path of a TOML file.", autocompletion=scenario_names),
+    ] = "demo",
     form: Form = None,
     variant: Variants = "",
     duration: Duration = None,
@@ -177,6 +180,7 @@ def fly(
         key=key,
         id_offset=id_offset,
     )
+    console = terminal()
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -253,7 +257,7 @@ def ps() -> None:
 
     entries = running()
     if not entries:
-        console.print("no swarm is running")
+        terminal().print("no swarm is running")
         return
     table = Table("name", "scenario", "UAVs", "pid", "ports", "since", "flies", "dashboard", box=None)
     for entry in entries:
@@ -267,7 +271,7 @@ def ps() -> None:
             _how_it_flies(entry),
             entry.viewer or "",
         )
-    console.print(table)
+    terminal().print(table)
 
 
 _Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
@@ -281,7 +285,7 @@ def _tell(name: str | None, command: str) -> None:
     except LookupError as error:
         fail(str(error))
     except (OSError, RuntimeError) as error:
-        console.print(f"[bold red]{escape(str(error))}[/]")
+        terminal().print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
         raise typer.Exit(_FLIGHT_FAILED) from error
 
 
@@ -295,7 +299,9 @@ def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="
 
 
 def doctor(
-    scenario: Annotated[str, typer.Argument(help="Scenario that is flown to measure.")] = "demo",
+    scenario: Annotated[
+        str, typer.Argument(help="Scenario that is flown to measure.", autocompletion=scenario_names)
+    ] = "demo",
     variant: Variants = "",
     speed: Annotated[str, typer.Option(help="Times real time that are wanted, or 'max'.")] = "1",
 ) -> None:
@@ -305,6 +311,7 @@ def doctor(
     factor = speed_factor(speed, "--speed")
     mission = load_mission(scenario, None, variant, None, None, None)
     table = Table("what", "found", "verdict", box=None)
+    console = terminal()
     with console.status("looking around") as status:
         for row in examine(mission, factor, progress=status.update):
             table.add_row(*map(escape, row))

@@ -80,7 +80,7 @@ def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", set
             f"{len(mission.graph.weights)} directed edges, {timing.duration:g} s, "
             f"control {1e6 / timing.period_us:g} Hz, exchange {exchange}, {len(mission.claims)} claims: can fly",
             highlight=False,
-            soft_wrap=True,
+            soft_wrap=not out.is_terminal,
         )
         for text in mission.warnings:
             warned.setdefault(text, []).append(case)
@@ -154,7 +154,7 @@ def verify(
     for case in cases or cases_of(first):
         flight, results = claims_in_flight(load_case(scenario, case, settings or []))
         lost = "".join(f"; UAV {uav} lost at {t:g} s: {why}" for uav, (t, why) in flight.lost.items())
-        out.print(f"{case}: {summary(results)}{lost}", markup=False, highlight=False, soft_wrap=True)
+        out.print(f"{case}: {summary(results)}{lost}", markup=False, highlight=False, soft_wrap=not out.is_terminal)
         failures += len(failed(results))
         if shown := results if every else failed(results):
             out.print(claims_table(shown))

@@ -36,7 +36,8 @@ def show_verdict(console: Console, verdict: Verdict) -> None:
     lines += [f"  [yellow]{escape(text)}[/]" for text in verdict.remarks]
     lines += [f"  [dim]{escape(text)}[/]" for text in verdict.largest]
     for line in lines:
-        console.print(line, highlight=False, soft_wrap=True)
+        # On a terminal between words; whole where it goes into a file.
+        console.print(line, highlight=False, soft_wrap=not console.is_terminal)
 
 
 def as_json(run: Run, results: list[Result]) -> str:
