@@ -54,6 +54,8 @@ NOT_RUN = {
     "pytest": "is these tests",
     "ftcc doctor": "flies for a quarter of a minute: tests/groundside/test_doctor.py",
     "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
+    "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
+    "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
     "docs/tick.md drawing": "is no text to type",
 }
