@@ -171,7 +171,8 @@ class Crew:
         if to_do & NOTE:
             for at_us, uav, severity, text in told(self.group.autopilots, self.specs):
                 self.gate.tell(Said(severity, text, uav, at_us))
-        if to_do & REPORT:
+        if to_do & (REPORT | SECOND):
+            # What the log has of each simulated second is sent when this process is awake anyhow.
             self.report()
 
     def report(self) -> None:

@@ -62,8 +62,11 @@ def _attitude(seat: Seat) -> Any:
     q0, q1, q2, q3, p, q, r = seat.message[:7].tolist()
     roll = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q0 * q2 - q3 * q1))))
-    yaw = math.atan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    return _M.MAVLink_attitude_message(_stamp(seat), roll, pitch, yaw, p, q, r)
+    return _M.MAVLink_attitude_message(_stamp(seat), roll, pitch, _yaw(q0, q1, q2, q3), p, q, r)
+
+
+def _yaw(q0: float, q1: float, q2: float, q3: float) -> float:
+    return math.atan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
 
 
 def _attitude_quaternion(seat: Seat) -> Any:
@@ -76,7 +79,7 @@ def _local_position(seat: Seat) -> Any:
 
 def _heading(seat: Seat) -> float:
     """Degrees, 0..360."""
-    return math.degrees(_attitude(seat).yaw) % 360.0
+    return math.degrees(_yaw(*seat.message[:4].tolist())) % 360.0
 
 
 def _global_position(seat: Seat) -> Any:
@@ -348,21 +351,20 @@ def requested(seat: Seat, message: int) -> list[Any]:
 class Schedule:
     """When which stream is due towards one peer: at its rate in simulated or in wall time, whichever is slower.
 
-    Streams with a least rate (see `Rates`) are due at that rate in simulated time, too.
+    Streams with a least rate (see `Rates`) are due at that rate in simulated time, too, when they are asked for: that
+    is promised for every simulated second, and `next_us` does not speak of it.
     """
 
     def __init__(self, rates: Iterable[float]) -> None:
         self._rates = list(rates)
-        self._least = rates.least if isinstance(rates, Rates) else (0.0,) * len(self._rates)
+        least = rates.least if isinstance(rates, Rates) else ()
+        self._least = {n: int(_SLACK * 1e6 / rate) for n, rate in enumerate(least) if 0.0 < rate < self._rates[n]}
+        """Simulated us after which those that have a least rate are due in any case."""
         self._last_us = [-(10**12)] * len(self._rates)
         self._last_wall = [-math.inf] * len(self._rates)
         self._next_us = 0
         self._next_wall = 0.0
         """Nothing is due before these times, simulated us and wall s (monotonic)."""
-        self._looked = (0, 0.0)
-        """When what is due was looked for, simulated us and wall s."""
-        self._pace = 0.0
-        """Where simulated time is to be kept and not the wall clock, wall s per simulated us; otherwise 0."""
 
     @property
     def next_us(self) -> int:
@@ -385,44 +387,31 @@ class Schedule:
 
     def due(self, now_us: int) -> list[int]:
         """The streams that are due at this tick."""
-        if now_us < self._next_us and not self._pace:
+        if now_us < self._next_us:
             return []
         wall = time.monotonic()
-        if now_us < self._next_us:
-            self._next_wall = wall + (self._next_us - now_us) * self._pace
-            return []
-        if wall < self._next_wall and not self._pace:
-            return []
+        if wall < self._next_wall:
+            return self._due_at_least(now_us, wall)
         found = []
         self._next_us, self._next_wall = now_us + 1_000_000, wall + 1.0
-        least_us = now_us + 10**12
         for n, rate in enumerate(self._rates):
             if rate <= 0.0:
                 continue
             interval_us = 1e6 / rate
             behind = now_us - self._last_us[n]
-            least = 0.0 < self._least[n] < rate
-            soon = wall - self._last_wall[n] < _SLACK / rate
-            if soon and least:
-                interval_us = 1e6 / self._least[n]
-            if behind >= _SLACK * interval_us and (not soon or least):
+            late = n in self._least and behind >= self._least[n]
+            if late or (behind >= _SLACK * interval_us and wall - self._last_wall[n] >= _SLACK / rate):
                 # On the grid of the rate, so that a tick's length does not add up.
                 self._last_us[n] += int(behind // interval_us * interval_us) or int(interval_us)
                 self._last_wall[n] = wall
                 found.append(n)
-            self._next_us = min(self._next_us, max(now_us, int(self._last_us[n] + _SLACK * 1e6 / rate)))
+            self._next_us = min(self._next_us, max(now_us, int(self._last_us[n] + _SLACK * interval_us)))
             self._next_wall = min(self._next_wall, self._last_wall[n] + _SLACK / rate)
-            if least:
-                least_us = min(least_us, int(self._last_us[n] + _SLACK * 1e6 / self._least[n]))
-        self._hurry(now_us, wall, least_us)
         return found
 
-    def _hurry(self, now_us: int, wall: float, least_us: int) -> None:
-        """Be due at ``least_us`` where simulated time, as fast as it goes by now, comes there before the wall clock."""
-        looked_us, looked = self._looked
-        self._looked = now_us, wall
-        pace = (wall - looked) / max(now_us - looked_us, 1)
-        hurries = wall + (least_us - now_us) * pace < self._next_wall
-        self._pace = pace if hurries else 0.0
-        if hurries:
-            self._next_us, self._next_wall = least_us, wall + (least_us - now_us) * pace
+    def _due_at_least(self, now_us: int, wall: float) -> list[int]:
+        """The streams that simulated time alone has come to."""
+        found = [n for n, after in self._least.items() if self._rates[n] > 0.0 and now_us - self._last_us[n] >= after]
+        for n in found:
+            self._last_us[n], self._last_wall[n] = now_us, wall
+        return found

@@ -15,14 +15,14 @@ TICK_US = 10_000
 def sent(schedule: Schedule, speed: float, seconds: float, monkeypatch: pytest.MonkeyPatch) -> list[list[float]]:
     """Simulated times at which each stream is sent where ticks come ``speed`` times as fast as real time.
 
-    The schedule is asked where both of its times have come, as an autopilot asks.
+    The schedule is asked where both of its times have come, and each second, as an autopilot asks.
     """
     times: list[list[float]] = [[] for _ in schedule._rates]
     wall = 1000.0
     monkeypatch.setattr(streams.time, "monotonic", lambda: wall)
     for tick in range(round(seconds * 1e6 / TICK_US)):
         wall += TICK_US / 1e6 / speed
-        if tick * TICK_US >= schedule.next_us and wall >= schedule.next_wall:
+        if tick % 100 == 0 or (tick * TICK_US >= schedule.next_us and wall >= schedule.next_wall):
             for n in schedule.due(tick * TICK_US):
                 times[n].append(tick * TICK_US / 1e6)
     return times
@@ -46,10 +46,11 @@ def test_faster_than_the_clock_a_least_rate_is_kept_in_simulated_time(
 ) -> None:
     rates = [10.0, 5.0]
     ten, five = sent(Schedule(Rates(rates, [0.0, 1.0])), speed, 100.0, monkeypatch)
-    assert max(gaps(five)[2:]) < 1.3
-    # The wall clock of the others is kept as without.
+    assert max(gaps(five)) < 1.9
+    assert len(five) >= 99
+    # The others are sent as without.
     alone, _ = sent(Schedule(rates), speed, 100.0, monkeypatch)
-    assert len(alone) * 0.7 - 1 <= len(ten) <= len(alone) + 1
+    assert ten == alone
 
 
 def test_without_a_least_rate_only_the_clock_counts(monkeypatch: pytest.MonkeyPatch) -> None:
