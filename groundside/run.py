@@ -131,8 +131,8 @@ class Run:
 
     @property
     def started(self) -> float:
-        """Unix time (s) at which the run started, and simulated time 0 in exported tracks; of a run of an earlier
-        version, when its folder was begun.
+        """Unix time (s) of simulated time 0 in exported tracks: when the run started, or a simulation was recorded; of
+        a run of an earlier version, when its folder was begun.
         """
         flown = self.scenario.plan.flown
         if flown is not None and flown.run is not None:
