@@ -126,6 +126,8 @@ class _Flight:
         if time.monotonic() - self.refreshed < _REFRESH:
             return
         self.refreshed = time.monotonic()
+        if trouble := self.station.take_trouble():
+            self.note(Event(-1.0, "error", trouble))
         self.scheduled_events()
         if self.swarm.flow.state == "flying" and self.station.t > 0.0:
             self.watch_pace()
@@ -188,6 +190,7 @@ def fly(
         listeners=options.listeners,
         key=options.key,
         id_offset=options.id_offset,
+        started=run_started,
         on_event=on_event,
     )
     # The fork server must exist before this process opens anything.

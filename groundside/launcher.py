@@ -123,6 +123,7 @@ class Swarm:
     listeners : where other ground stations may listen.
     key : key file for signed links to the ground.
     id_offset : what UAVs' ids have added as MAVLink systems towards the ground.
+    started : Unix time that counts as simulated time 0, s; default: now.
     on_event : called with everything worth showing.
     """
 
@@ -139,6 +140,7 @@ class Swarm:
         listeners: tuple[tuple[str, int], ...] = (),
         key: Path | None = None,
         id_offset: int = 0,
+        started: float | None = None,
         on_event: Callable[[Event], None],
     ) -> None:
         self.mission = mission
@@ -164,7 +166,7 @@ class Swarm:
             key=key,
             home=mission.home,
             id_offset=id_offset,
-            epoch_us=time.time_ns() // 1000,
+            epoch_us=round((time.time() if started is None else started) * 1e6),
         )
         self.groups = groups
 

@@ -69,6 +69,7 @@ class Monitor:
         self._log = log.open("ab") if log else None
         self._started_us = int((time.time() if started is None else started) * 1e6)
         self._told_us = 0
+        self._trouble = ""
         self._events: list[Event] = []
         self.t = 0.0
         """Newest simulated time heard, s."""
@@ -81,7 +82,10 @@ class Monitor:
         """Free the port, finish the log."""
         self._ear.close()
         if self._log:
-            self._log.close()
+            try:
+                self._log.close()
+            except OSError as error:
+                self._end_log(error)
             self._log = None
 
     def read(self) -> None:
@@ -92,11 +96,28 @@ class Monitor:
                 if self._told_us < newest <= _LONGEST_US:
                     self._told_us = newest
                 stamp = _STAMP.pack((self._started_us + self._told_us) & ~_LINK)
-                self._log.write(b"".join([part for one in told for part in (stamp, one.frame)]))
+                self._write(b"".join([part for one in told for part in (stamp, one.frame)]))
             for one in told:
                 heard = self._of_system.get(one.system)
                 if heard is not None:
                     self._take(heard, one)
+
+    def _write(self, frames: bytes) -> None:
+        """Append to the log; one that cannot be written ends."""
+        assert self._log is not None
+        try:
+            self._log.write(frames)
+        except OSError as error:
+            self._end_log(error)
+
+    def _end_log(self, error: OSError) -> None:
+        self._log = None
+        self._trouble = f"the telemetry is not logged any further: {error.strerror or error}"
+
+    def take_trouble(self) -> str:
+        """Why the log has ended before its time, once; else empty."""
+        trouble, self._trouble = self._trouble, ""
+        return trouble
 
     def _take(self, heard: _Heard, told: Told) -> None:
         if told.kind == ARRAY:

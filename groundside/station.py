@@ -21,8 +21,15 @@ from ftcc.link.modes import code_of, mode_called
 
 __all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState"]
 
-ACTUATORS = {"aileron": ("servo", 1), "elevator": ("servo", 2), "rudder": ("servo", 3), "thrust": ("motor", 1)}
-"""Unit and instance of what can fail on board by our names."""
+ACTUATORS = {
+    "aileron": ("servo", 1),
+    "elevator": ("servo", 2),
+    "rudder": ("servo", 3),
+    "thrust": ("motor", 1),
+    "bank": ("servo", 1),
+    "load_factor": ("servo", 2),
+}
+"""Unit and instance of what can fail on board by our names; the last two are what a point mass is steered by."""
 
 _NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
 
@@ -93,7 +100,8 @@ class Station(Conversation):
 
         Parameters
         ----------
-        what : "aileron", "elevator", "rudder", "thrust", or "position", "attitude" of the navigation solution.
+        what : "aileron", "elevator", "rudder", "thrust", or of a point mass "bank", "load_factor"; or "position",
+            "attitude" of the navigation solution.
         kind : "wrong", "off", "stuck", "slow", "intermittent" or "ok".
         at : simulated time, s; None: at once.
         sizes : parameters by their names without FAIL_, in small letters, such as ``eff=0.6, bias=0.2``.

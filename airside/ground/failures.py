@@ -16,7 +16,7 @@ from ftcc.airside.model import Model, level_deflections
 from ftcc.link.actuators import ACTUATORS, SLOT, in_slots
 from ftcc.link.channel import Channel
 from ftcc.link.compiled import fields
-from ftcc.link.failures import AIRFRAME_SIZES, EVERY, LINK_SIZES, Meaning, failure_messages, meaning_of
+from ftcc.link.failures import AIRFRAME_SIZES, EVERY, LINK_SIZES, Meaning, failure_messages, meaning_of, parts_of
 from ftcc.link.mavlink import dialect
 from ftcc.link.text import as_seconds
 
@@ -40,6 +40,8 @@ class Failures:
         self._seat: Seat = link.seat
         self._waiting: tuple[Request, Meaning, int, float] | None = None
         """What the vehicle was asked: request, meaning, instance, and until when it may answer (wall, s)."""
+        self._names = in_slots(self._seat.scheme.commands)
+        """The actuators by slot, as this kind of aircraft has them."""
         self._armed: list[tuple[int, int, str, str, str]] = []
         """What will act: time us, number, severity, text, who."""
         self._count = 0
@@ -174,6 +176,7 @@ class Failures:
             what = "own radio" if instance == EVERY else f"link from UAV {instance}"
         else:
             what = self._part(meaning, instance)
+            what = self._names[SLOT[what]] if what in SLOT else what
         if meaning.kind == "ok":
             return f"{what} {meaning.text}"
         sizes = ", ".join(
@@ -185,11 +188,11 @@ class Failures:
 
     def _missing(self, meaning: Meaning, instance: int) -> str:
         """What the aircraft has, where it has nothing of what is to fail; else empty."""
-        travel = self._seat.spec.travel
+        has = [name for name in self._names if self._seat.spec.travel[SLOT[name]] > 0.0]
+        parts = parts_of(meaning.unit, has)
         asked = meaning.unit.parts if instance == EVERY else meaning.unit.parts[instance - 1 : instance]
-        if not asked or any(travel[SLOT[name]] > 0.0 for name in asked):
+        if not asked or (parts if instance == EVERY else instance in parts):
             return ""
-        has = [name for name in in_slots(self._seat.scheme.commands) if travel[SLOT[name]] > 0.0]
         return f"no {' or '.join(asked)}: it has {', '.join(has)}"
 
     @staticmethod

@@ -112,10 +112,13 @@ def commands() -> None:
 
 def fault(
     uav: Uav,
-    what: Annotated[str, typer.Argument(help="aileron, elevator, rudder, thrust; position, attitude (navigation).")],
+    what: Annotated[
+        str,
+        typer.Argument(help="aileron, elevator, rudder, thrust; bank, load_factor; position, attitude (navigation)."),
+    ],
     kind: Annotated[str, typer.Option(help="wrong, off, stuck, slow, intermittent.")] = "wrong",
     effectiveness: Annotated[float | None, typer.Option(help="Remaining effectiveness, 0..1; default 1.")] = None,
-    bias: Annotated[float | None, typer.Option(help="rad or N.")] = None,
+    bias: Annotated[float | None, typer.Option(help="rad, N, or g of a load factor.")] = None,
     onset: Annotated[float | None, typer.Option(help="Rate of the exponential onset, 1/s; default: a step.")] = None,
     slew: Annotated[float | None, typer.Option(help="Largest rate of a slow actuator, rad/s or N/s.")] = None,
     period: Annotated[float | None, typer.Option(help="Of intermittent faults, s.")] = None,

@@ -246,3 +246,18 @@ def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
     assert station.snapshot().uavs == {}
     station.close()
     assert (tmp_path / "telemetry.tlog").read_bytes() == b""
+
+
+def test_on_a_full_disk_the_log_ends_and_the_station_hears_on(pilot: socket.socket, tmp_path: Path) -> None:
+    log = tmp_path / "telemetry.tlog"
+    log.symlink_to("/dev/full")
+    station = Monitor(0, {pilot.getsockname()[1]}, (1,), PLANT, SIGNALS, log)
+    pilot.connect(station._ear._socket.getsockname())
+    codec = Codec(1, 1)
+    for n in range(200):
+        pilot.send(codec.pack(float_array(10_000 * n, "truth", [1.0] * len(NAMES))))
+        station.read()
+    assert station.take_trouble() == "the telemetry is not logged any further: No space left on device"
+    assert station.take_trouble() == ""
+    assert station.t == pytest.approx(1.99)
+    station.close()
