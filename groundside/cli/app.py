@@ -69,7 +69,12 @@ class _Help:
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         """The command's example, whole on its line: to be copied."""
-        path = " ".join(("ftcc", *ctx.command_path.split()[1:]))
+        names: list[str] = []
+        while ctx.parent is not None:
+            names.insert(0, ctx.info_name)
+            ctx = ctx.parent
+        # However the program was started, here it is called ftcc.
+        path = " ".join(("ftcc", *names))
         if path in EXAMPLES:
             formatter.write(f"\nExample:\n  {EXAMPLES[path]}\n")
 
