@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ftcc.airside.ground.answers import ACCEPTED, DENIED, UNSUPPORTED, Answer, Request, whole
 from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.ground.motion import change_altitude, change_speed, reposition
-from ftcc.airside.ground.streams import SLOWEST, requested
+from ftcc.airside.ground.schedule import SLOWEST
+from ftcc.airside.ground.streams import requested
 from ftcc.link.mavlink import dialect
 from ftcc.link.modes import HOLD, MISSION, mode_of
 

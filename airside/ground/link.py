@@ -16,9 +16,10 @@ from ftcc.airside.ground.failures import Failures
 from ftcc.airside.ground.offboard import Offboard
 from ftcc.airside.ground.parameters import Parameters
 from ftcc.airside.ground.requests import MESSAGES
+from ftcc.airside.ground.schedule import Schedule
 from ftcc.airside.ground.seat import Seat
 from ftcc.airside.ground.signatures import Signatures
-from ftcc.airside.ground.streams import STREAMS, Schedule, heartbeat, rates_of
+from ftcc.airside.ground.streams import LOGGED, STREAMS, heartbeat, rates_of
 from ftcc.link.gate import LauncherGoneError
 from ftcc.link.ground import GroundSocket, Peer
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, dialect, status_text
@@ -56,7 +57,9 @@ class GroundLink:
         """To be listened to."""
         self._rates = rates_of(seat, station=False)
         self._schedules: dict[Peer, Schedule] = {
-            peer: Schedule(rates_of(seat, socket is self._station)) for socket in self.sockets for peer in socket.peers
+            peer: Schedule(rates_of(seat, socket is self._station), LOGGED if socket is self._station else ())
+            for socket in self.sockets
+            for peer in socket.peers
         }
         self._flows = list(self._schedules.items())
         self._last_heartbeat = 0.0

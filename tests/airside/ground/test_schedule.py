@@ -6,8 +6,8 @@ import itertools
 
 import pytest
 
-from ftcc.airside.ground import streams
-from ftcc.airside.ground.streams import Rates, Schedule
+from ftcc.airside.ground import schedule as schedules
+from ftcc.airside.ground.schedule import Schedule
 
 TICK_US = 10_000
 
@@ -19,7 +19,7 @@ def sent(schedule: Schedule, speed: float, seconds: float, monkeypatch: pytest.M
     """
     times: list[list[float]] = [[] for _ in schedule._rates]
     wall = 1000.0
-    monkeypatch.setattr(streams.time, "monotonic", lambda: wall)
+    monkeypatch.setattr(schedules.time, "monotonic", lambda: wall)
     for tick in range(round(seconds * 1e6 / TICK_US)):
         wall += TICK_US / 1e6 / speed
         if tick % 100 == 0 or (tick * TICK_US >= schedule.next_us and wall >= schedule.next_wall):
@@ -34,7 +34,7 @@ def gaps(times: list[float]) -> list[float]:
 
 @pytest.mark.parametrize("speed", [1.0, 0.5])
 def test_no_faster_than_the_clock_every_rate_is_kept(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    ten, five, none = sent(Schedule(Rates([10.0, 5.0, 0.0], [0.0, 1.0, 1.0])), speed, 20.0, monkeypatch)
+    ten, five, none = sent(Schedule([10.0, 5.0, 0.0], [0.0, 1.0, 1.0]), speed, 20.0, monkeypatch)
     assert len(ten) == pytest.approx(200, abs=2)
     assert len(five) == pytest.approx(100, abs=2)
     assert none == []
@@ -45,7 +45,7 @@ def test_faster_than_the_clock_a_least_rate_is_kept_in_simulated_time(
     speed: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rates = [10.0, 5.0]
-    ten, five = sent(Schedule(Rates(rates, [0.0, 1.0])), speed, 100.0, monkeypatch)
+    ten, five = sent(Schedule(rates, [0.0, 1.0]), speed, 100.0, monkeypatch)
     assert max(gaps(five)) < 1.9
     assert len(five) >= 99
     # The others are sent as without.
