@@ -121,7 +121,8 @@ COMMANDS: dict[int, Command] = {
     ),
     _M.MAV_CMD_DO_CHANGE_SPEED: Command(change_speed, "speed (m/s) of a leader; type 0 or 1"),
     _M.MAV_CMD_DO_REPOSITION: Command(
-        reposition, "altitude, speed or both of a leader; frames as above; denied where a place is given"
+        reposition,
+        "altitude and speed of a leader, frames as DO_CHANGE_ALTITUDE; no place; nothing given: mode hold",
     ),
     _M.MAV_CMD_INJECT_FAILURE: Command(
         lambda link, request: link.failures.inject(request), "see `ftcc failures`; acts at FTCC_AT, sizes from FAIL_*"
