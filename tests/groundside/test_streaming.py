@@ -128,7 +128,12 @@ def test_ctrl_c_while_a_block_is_written_leaves_whole_blocks(tmp_path: Path, mon
         write(self, values)
 
     monkeypatch.setattr(TableWriter, "write", interrupted)
-    recorded = simulate.simulate(mission(), tmp_path)
+    # As at a terminal: whoever started the tests may have had Ctrl-C ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        recorded = simulate.simulate(mission(), tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, before)
     rows = recorded.signals.num_rows
     assert rows == 8 * 200 < 8 * 1201
     assert "interrupted" in [event["text"] for event in recorded.events]
