@@ -106,7 +106,8 @@ def test_a_scheme_that_numba_refuses_flies_as_plain_python_with_the_same_bits(
     refusal = "scheme plain_consensus flies as plain Python, slowly: numba cannot compile it"
     with pytest.warns(PlainPython, match=rf"{refusal} \(.*plain_consensus\.py") as warned:
         run = simulate(mission("plain_consensus", SECONDS), tmp_path / "simulated")
-    assert len(warned) == 1
+    # Others may be there: of a cache that another process is writing into.
+    assert len([one for one in warned if issubclass(one.category, PlainPython)]) == 1
     assert same_flight(run.path, flown.path)
 
     options = ("--set", "scheme=plain_consensus", "--speed", "max", "--viewer", "none", "--duration", f"{SECONDS:g}")
