@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ftcc.groundside.feed import Feed
 from ftcc.groundside.launcher import Outcome, Swarm, automatic_pack
 from ftcc.groundside.monitor import Monitor
-from ftcc.groundside.open_files import files_needed, provide_files
+from ftcc.groundside.open_files import provide_files
 from ftcc.groundside.pace import Setup, usable_cores
 from ftcc.groundside.pacing import Pacing
 from ftcc.groundside.registry import Card, Control, Entry
@@ -169,7 +169,7 @@ def fly(
     TimeoutError
         If not all processes get ready.
     """
-    provide_files(files_needed(mission, options.pack, len(options.listeners)))
+    provide_files(mission, options.pack, len(options.listeners))
     folder = options.folder
     folder.mkdir(parents=True, exist_ok=True)
     run_started = time.time()

@@ -47,21 +47,25 @@ def files_needed(mission: Mission, pack: int, listeners: int) -> int:
     return max(launcher, _VEHICLE + _PER_VEHICLE * k, _AUTOPILOT + max(peers) + (_PER_AUTOPILOT + listeners) * k)
 
 
-def provide_files(needed: int) -> None:
-    """Let this process, and those that it starts, open so many files.
+def provide_files(mission: Mission, pack: int, listeners: int) -> None:
+    """Let this process, and those that it starts, open as many files as a flight needs; arguments as `files_needed`.
 
     Raises
     ------
     TooFewFilesError
         If the system does not allow it.
     """
+    needed = files_needed(mission, pack, listeners)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft == resource.RLIM_INFINITY or soft >= needed:
         return
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
     except (ValueError, OSError):
+        packs = {n: files_needed(mission, n, listeners) for n in range(1, len(mission.vehicles) + 1)}
+        best = min(packs, key=lambda n: packs[n])
+        instead = f", or fly with --pack {best}, which needs {packs[best]}" if packs[best] <= hard else ""
         raise TooFewFilesError(
             f"a process of this flight opens up to {needed} files, {hard} are allowed: set `ulimit -n {needed}` "
-            "(as root, or in /etc/security/limits.conf), or fly fewer processes with --pack auto"
+            f"(as root, or in /etc/security/limits.conf){instead}"
         ) from None

@@ -152,10 +152,10 @@ def fly(
     _check_systems(max(uavs), id_offset)
     _check_key(key, [uav + id_offset for uav in uavs])
 
-    from ftcc.groundside.open_files import files_needed, provide_files
+    from ftcc.groundside.open_files import provide_files
     from ftcc.groundside.registry import check_name
 
-    provide_files(files_needed(mission, count, len(listeners)))
+    provide_files(mission, count, len(listeners))
     check_name(f"{mission.name}-20000101-000000-2" if out is None else out.name)
 
     from ftcc.groundside.fly import FlightOptions

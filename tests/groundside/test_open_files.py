@@ -43,12 +43,19 @@ def test_every_process_and_every_uav_in_one_counts() -> None:
 
 
 def test_room_is_made_up_to_what_the_system_allows(limits: Limits) -> None:
-    provide_files(40)
-    assert limits.now == (50, 100)
-    provide_files(80)
-    assert limits.now == (80, 100)
-    with pytest.raises(TooFewFilesError, match="up to 101 files, 100 are allowed: set `ulimit -n 101`"):
-        provide_files(101)
+    mission = resolve(load("containment"))
+    provide_files(mission, 4, 2)
+    assert limits.now == (55, 100)
+    provide_files(mission, 8, 2)
+    assert limits.now == (82, 100)
+    limits.now = 50, 87
+    with pytest.raises(
+        TooFewFilesError, match=r"up to 88 files, 87 are allowed: set `ulimit -n 88` .*or fly with --pack"
+    ):
+        provide_files(mission, 1, 2)
+    limits.now = 20, 30
+    with pytest.raises(TooFewFilesError, match=r"limits.conf\)$"):
+        provide_files(mission, 1, 2)
 
 
 def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
