@@ -15,8 +15,10 @@ __all__ = ["set_mode"]
 
 
 def set_mode(link: GroundLink, mode: int) -> Answer:
-    """Change the mode."""
+    """Change the mode; to set the present one again does nothing."""
     seat = link.seat
+    if mode == seat.autopilots.mode[seat.i]:
+        return Answer(ACCEPTED)
     if mode == OFFBOARD:
         why = link.offboard.refused()
         if why:
@@ -28,6 +30,5 @@ def set_mode(link: GroundLink, mode: int) -> Answer:
         release_from_ground(seat.autopilots.profile_commands[seat.i])
     if mode == MISSION:
         link.offboard.release()
-    before = int(seat.autopilots.mode[seat.i])
     seat.autopilots.mode[seat.i] = mode
-    return Answer(ACCEPTED, event="" if before == mode else f"mode {NAMES[mode]}")
+    return Answer(ACCEPTED, event=f"mode {NAMES[mode]}")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import time
 
+import numpy as np
 import pytest
 
 from ftcc.groundside.conversation import RefusedError
 from ftcc.link.mavlink import LOOPBACK
-from tests.airside.ground.in_flight import M, ask, flying
+from tests.airside.ground.in_flight import LEVEL, M, ask, flying
 
 HOME = 500.0
 NOT_GIVEN = 2**31 - 1
@@ -122,6 +123,21 @@ def test_change_altitude_in_another_frame_is_refused(leader):
     for frame in (1, 2, 4, 7, 8, 9, 10, 11, 20, NAN):
         with pytest.raises(RefusedError, match=r"frame .*: 0, 5 \(above sea\)"):
             station.command(7, M.MAV_CMD_DO_CHANGE_ALTITUDE, 1010.0, frame)
+
+
+def test_the_present_mode_set_again_changes_nothing(leader):
+    """Neither what was commanded in it, nor, in offboard, the time without targets."""
+    bench, station = leader
+    station.command(7, M.MAV_CMD_DO_CHANGE_ALTITUDE, 1010.0, 3)
+    station.mode(7, "mission")
+    assert commanded(bench) == (1010.0, 30.0)
+    station.send(7, local(Z, z=-1010.0))
+    station.mode(7, "offboard")
+    ends = bench.crew.ground[0].offboard.next_us
+    for tick in range(1, 51):
+        bench.answer(tick, LEVEL, np.zeros(4))
+    station.mode(7, "offboard")
+    assert bench.crew.ground[0].offboard.next_us == ends
 
 
 # Targets.
