@@ -20,21 +20,21 @@ _LEAST_AIRSPEED = 5.0
 
 
 @compiled
-def velocity(V, gamma, chi):  # type: ignore[no-untyped-def]
+def velocity(V, gamma, chi):
     """Velocity (m/s) from speed, flight-path angle and course."""
     ground = V * math.cos(gamma)
     return ground * math.cos(chi), ground * math.sin(chi), V * math.sin(gamma)
 
 
 @compiled
-def triad(gamma, chi):  # type: ignore[no-untyped-def]
+def triad(gamma, chi):
     """The flight path's unit vectors: along track, to the right, up."""
     cg, sg, cc, sc = math.cos(gamma), math.sin(gamma), math.cos(chi), math.sin(chi)
     return (cg * cc, cg * sc, sg), (-sc, cc, 0.0), (-sg * cc, -sg * sc, cg)
 
 
 @compiled
-def drag(V, n, model):  # type: ignore[no-untyped-def]
+def drag(V, n, model):
     """Drag (N) at airspeed ``V`` and load factor ``n`` in still air: the polar at the angle of attack of that lift."""
     speed = max(V, _LEAST_AIRSPEED)
     lifting = 0.5 * model.rho * speed * speed * model.S
@@ -43,7 +43,7 @@ def drag(V, n, model):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def acceleration(V, gamma, chi, thrust, n, mu, model):  # type: ignore[no-untyped-def]
+def acceleration(V, gamma, chi, thrust, n, mu, model):
     """P'' (m/s^2) under thrust (N), load factor and bank (rad)."""
     along, right, up = triad(gamma, chi)
     a = (thrust - drag(V, n, model)) / model.m
@@ -57,12 +57,12 @@ def acceleration(V, gamma, chi, thrust, n, mu, model):  # type: ignore[no-untype
 
 
 @compiled
-def _dot(p, q):  # type: ignore[no-untyped-def]
+def _dot(p, q):
     return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
 @compiled
-def commands_for(x, y, z, V, gamma, chi, bank_max, n_max, model):  # type: ignore[no-untyped-def]
+def commands_for(x, y, z, V, gamma, chi, bank_max, n_max, model):
     """Thrust (N), load factor and bank (rad), within their limits, that accelerate by ``x, y, z`` (m/s^2)."""
     along, right, up = triad(gamma, chi)
     wanted = (x, y, z + model.g)

@@ -248,7 +248,7 @@ class Swarm:
 
     def fileno(self) -> int:
         """A descriptor that can be read where a process has said something, or has died."""
-        return self._selector.fileno()  # type: ignore[attr-defined,no-any-return]
+        return self._selector.fileno()
 
     def attend(self) -> None:
         """Take in what the processes said, and notice who died."""

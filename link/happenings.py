@@ -29,7 +29,7 @@ def new_happenings() -> Happenings:
 
 
 @compiled
-def note(happenings, now_us, i, kind, number):  # type: ignore[no-untyped-def]
+def note(happenings, now_us, i, kind, number):
     """Append what happened to UAV ``i``; a list that nobody empties keeps what came first."""
     n = happenings.used[0]
     if n < happenings.rows.shape[0]:

@@ -80,7 +80,7 @@ class Waiter:
 
     def fileno(self) -> int:
         """A descriptor that can be read where one of them can."""
-        return self._selector.fileno()  # type: ignore[attr-defined,no-any-return]
+        return self._selector.fileno()
 
     def close(self) -> None:
         self._selector.close()

@@ -11,13 +11,13 @@ __all__ = ["lead_filter", "leading_command", "modelled_position", "modelled_stro
 
 
 @compiled
-def modelled_position(position, in_force, lag, h):  # type: ignore[no-untyped-def]
+def modelled_position(position, in_force, lag, h):
     """Position of a first-order actuator of bandwidth ``lag`` (rad/s) after ``h`` seconds of the command in force."""
     return in_force + (position - in_force) * math.exp(-lag * h)
 
 
 @compiled
-def modelled_stroke(position, in_force, time_constant, h):  # type: ignore[no-untyped-def]
+def modelled_stroke(position, in_force, time_constant, h):
     """Mean position of a first-order actuator over ``h`` seconds of the command in force, and its position after them.
 
     A time constant of 0 s is an actuator without lag.
@@ -29,13 +29,13 @@ def modelled_stroke(position, in_force, time_constant, h):  # type: ignore[no-un
 
 
 @compiled
-def leading_command(position, wanted, lag, target_lag):  # type: ignore[no-untyped-def]
+def leading_command(position, wanted, lag, target_lag):
     """The command that moves an actuator of bandwidth ``lag`` to ``wanted`` as one of bandwidth ``target_lag``."""
     return position + (target_lag / lag) * (wanted - position)
 
 
 @compiled
-def lead_filter(value, target, slow, fast):  # type: ignore[no-untyped-def]
+def lead_filter(value, target, slow, fast):
     """Lead (slow s + 1)/(fast s + 1) on ``target``, both time constants in s, for slow != fast.
 
     Returns

@@ -25,7 +25,7 @@ __all__ = [
 
 
 @compiled
-def first_order_rate(value, target, time_constant):  # type: ignore[no-untyped-def]
+def first_order_rate(value, target, time_constant):
     """Rate of a first-order filter, eqs. (3.31), (4.24): time_constant value' + value = target.
 
     Dynamic surface control takes this rate as the derivative of the virtual control ``target``.
@@ -34,7 +34,7 @@ def first_order_rate(value, target, time_constant):  # type: ignore[no-untyped-d
 
 
 @compiled
-def butterworth(value, rate, target, w):  # type: ignore[no-untyped-def]
+def butterworth(value, rate, target, w):
     """Second-order Butterworth low-pass of bandwidth ``w`` (rad/s), eq. (6.14): y'' = w^2 (x - y) - sqrt(2) w y'.
 
     Returns
@@ -45,7 +45,7 @@ def butterworth(value, rate, target, w):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def high_gain_observer(value, rate, target, epsilon, damping):  # type: ignore[no-untyped-def]
+def high_gain_observer(value, rate, target, epsilon, damping):
     """Second-order high-gain observer of ``target``, eqs. (5.22)-(5.24).
 
     epsilon value' = rate; epsilon rate' = -damping rate - value + target. rate / epsilon estimates target'.
@@ -58,7 +58,7 @@ def high_gain_observer(value, rate, target, epsilon, damping):  # type: ignore[n
 
 
 @compiled
-def sliding_mode_differentiator(value, derivative, target, mu1, mu2):  # type: ignore[no-untyped-def]
+def sliding_mode_differentiator(value, derivative, target, mu1, mu2):
     """First-order sliding-mode differentiator of ``target`` (Levant), eq. (6.42) with the lost dot of its second line.
 
     value' = -mu1 |value - target|^0.5 sign(value - target) + derivative; derivative' = -mu2 sign(value - target). It
@@ -73,7 +73,7 @@ def sliding_mode_differentiator(value, derivative, target, mu1, mu2):  # type: i
 
 
 @compiled
-def sliding_mode_differentiator_step(value, derivative, target, mu1, mu2, h):  # type: ignore[no-untyped-def]
+def sliding_mode_differentiator_step(value, derivative, target, mu1, mu2, h):
     """`sliding_mode_differentiator` after an implicit step of length ``h``, in closed form; ``target`` is the new one.
 
     Steps itself: explicit steps chatter with an amplitude that a law would pass on to its actuators.
@@ -90,7 +90,7 @@ def sliding_mode_differentiator_step(value, derivative, target, mu1, mu2, h):  #
 
 
 @compiled
-def low_pass_step(value, target, time_constant, h):  # type: ignore[no-untyped-def]
+def low_pass_step(value, target, time_constant, h):
     """A first-order low-pass after ``h`` seconds of a constant ``target``, exactly; a time constant of 0 is none."""
     if time_constant <= 0.0:
         return target
@@ -98,13 +98,13 @@ def low_pass_step(value, target, time_constant, h):  # type: ignore[no-untyped-d
 
 
 @compiled
-def complementary_rate(estimate, rate, measured, gain):  # type: ignore[no-untyped-def]
+def complementary_rate(estimate, rate, measured, gain):
     """Rate of a complementary filter: follows ``rate`` at once and ``measured`` with the bandwidth ``gain`` (1/s)."""
     return rate + gain * (measured - estimate)
 
 
 @compiled
-def limited_tracker(value, rate, target, target_rate, w, limit):  # type: ignore[no-untyped-def]
+def limited_tracker(value, rate, target, target_rate, w, limit):
     """Critically damped second-order tracker of a reference with limited acceleration (not in the monograph).
 
     No lag on a ramp.
@@ -117,7 +117,7 @@ def limited_tracker(value, rate, target, target_rate, w, limit):  # type: ignore
 
 
 @compiled
-def second_order_reference_step(value, rate, target, target_rate, w, damping, h):  # type: ignore[no-untyped-def]
+def second_order_reference_step(value, rate, target, target_rate, w, damping, h):
     """One step of length ``h`` of r'' = w^2 (x - r) + 2 damping w (x' - r') (not in the monograph); no lag on a ramp.
 
     Steps itself, semi-implicitly: stable for every h.
@@ -132,7 +132,7 @@ def second_order_reference_step(value, rate, target, target_rate, w, damping, h)
 
 
 @compiled
-def critically_damped_step(value, rate, target, w, h):  # type: ignore[no-untyped-def]
+def critically_damped_step(value, rate, target, w, h):
     """Second-order filter of a held ``target`` with a double pole at ``w`` (rad/s), ``h`` seconds later, exactly.
 
     Returns
@@ -146,7 +146,7 @@ def critically_damped_step(value, rate, target, w, h):  # type: ignore[no-untype
 
 
 @compiled
-def robust_exact_differentiator_step(value, derivative, target, damping, cubic, bound, phi, h):  # type: ignore[no-untyped-def]
+def robust_exact_differentiator_step(value, derivative, target, damping, cubic, bound, phi, h):
     """One Euler step of length ``h`` of the differentiator with fast convergence from afar, eq. (7.24).
 
     With er = value - target: value' = -damping (|er|^(1/2) + cubic |er|^(3/2)) sign(er) + derivative, and derivative'
@@ -167,7 +167,7 @@ def robust_exact_differentiator_step(value, derivative, target, damping, cubic, 
 
 
 @compiled
-def reference_shaper(z, v, a, target, target_rate, w, v_max, a_max):  # type: ignore[no-untyped-def]
+def reference_shaper(z, v, a, target, target_rate, w, v_max, a_max):
     """Third-order shaper of a reference (not in the monograph): triple pole at ``w``, limited speed and acceleration.
 
     No lag on a ramp, a lag of 3 a / w^2 on an acceleration a.

@@ -25,13 +25,13 @@ _ORDER, _SLOWEST, _FASTEST, _PER_DECADE, _STEP, _COUNT, _DIRECT = range(COLUMNS)
 
 
 @compiled
-def number_of_poles(slowest, fastest, per_decade):  # type: ignore[no-untyped-def]
+def number_of_poles(slowest, fastest, per_decade):
     """Poles of an operator for the band ``slowest`` to ``fastest`` (rad/s), with the one for all slower ones."""
     return math.floor(per_decade * math.log10(fastest / slowest) + 0.5) + 2
 
 
 @compiled
-def set_poles(bank, order, slowest, fastest, per_decade, h):  # type: ignore[no-untyped-def]
+def set_poles(bank, order, slowest, fastest, per_decade, h):
     """Fill ``bank`` for the integral of ``order`` a (0 <= a < 1) in steps of ``h``, unless it is filled so already.
 
     A bank whose poles change forgets; one whose step or order changes does not. With a = 0 there are no poles: the
@@ -71,7 +71,7 @@ def set_poles(bank, order, slowest, fastest, per_decade, h):  # type: ignore[no-
 
 
 @compiled
-def remember(bank, axis, now, before):  # type: ignore[no-untyped-def]
+def remember(bank, axis, now, before):
     """Advance the poles of ``axis`` over one step in which the signal went from ``before`` to ``now``."""
     mean = 0.5 * (now + before)
     for k in range(1, 1 + int(bank[0, _COUNT])):
@@ -79,7 +79,7 @@ def remember(bank, axis, now, before):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fractional_integral(bank, axis, value):  # type: ignore[no-untyped-def]
+def fractional_integral(bank, axis, value):
     """D^-a of the signal of ``axis`` that is ``value`` at present."""
     total = bank[0, _DIRECT] * value
     for k in range(1, 1 + int(bank[0, _COUNT])):
@@ -88,7 +88,7 @@ def fractional_integral(bank, axis, value):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def fractional_rate(bank, axis, value, rate):  # type: ignore[no-untyped-def]
+def fractional_rate(bank, axis, value, rate):
     """D^(1-a) of the signal of ``axis`` that is ``value`` and changes by ``rate`` at present."""
     total = bank[0, _DIRECT] * rate
     for k in range(1, 1 + int(bank[0, _COUNT])):

@@ -11,13 +11,13 @@ __all__ = ["disagreement", "error_sums", "extrapolated", "filtered_error_sums", 
 
 
 @compiled
-def extrapolated(value, rate, age, horizon):  # type: ignore[no-untyped-def]
+def extrapolated(value, rate, age, horizon):
     """A neighbour's value carried to the present by the rate it sent, for at most ``horizon`` seconds."""
     return value + rate * min(age, horizon)
 
 
 @compiled
-def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):  # type: ignore[no-untyped-def]
+def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):
     """sum_j a_ij (estimate - x_j), sum_j a_ij and sum_j a_ij x_j' over the neighbours, eqs. (3.20), (5.12).
 
     x_j and its rate are the first two values of a record, carried to the present, and ``ahead`` seconds beyond it, for
@@ -44,7 +44,7 @@ def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):  # type: 
 
 
 @compiled
-def weighted_average(heard, column, oldest, horizon):  # type: ignore[no-untyped-def]
+def weighted_average(heard, column, oldest, horizon):
     """Average of the neighbours' value in ``column`` and of its rate in the next one, eqs. (4.10), (4.11).
 
     Values are carried to the present by their rates, for at most ``horizon`` seconds; a neighbour whose record is older
@@ -70,7 +70,7 @@ def weighted_average(heard, column, oldest, horizon):  # type: ignore[no-untyped
 
 
 @compiled
-def motion_sums(heard, column, carried):  # type: ignore[no-untyped-def]
+def motion_sums(heard, column, carried):
     """sum_j a_ij, sum_j a_ij x_j at present and sum_j a_ij x_j', for x_j in ``column`` and its rate in the next one.
 
     ``carried`` = 1 carries each x_j to the present by its rate, 0 holds it as it was sent. With the sums,
@@ -95,7 +95,7 @@ def motion_sums(heard, column, carried):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def error_sums(error, heard, oldest):  # type: ignore[no-untyped-def]
+def error_sums(error, heard, oldest):
     """sum_j a_ij, sum_j a_ij (e - e_j) and sum_j a_ij e_j' over the neighbours, eqs. (7.12), (8.10).
 
     ``error`` is the own e of three angles (rad), and differences go the shorter way around; a record holds e_j and then
@@ -115,7 +115,7 @@ def error_sums(error, heard, oldest):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def filtered_error_sums(error, heard, memory, w, oldest, h):  # type: ignore[no-untyped-def]
+def filtered_error_sums(error, heard, memory, w, oldest, h):
     """As `error_sums`, with each neighbour's e_j through a `critically_damped_step` of ``w`` rad/s, whose rate is e_j'.
 
     ``memory`` (n, 7) holds a row per neighbour: 1 once heard, the filtered e_j, its rate. A filter starts at the first

@@ -13,7 +13,7 @@ __all__ = ["adapt_neuron", "adaptation_rate", "adaptation_step", "diagonal_energ
 
 
 @compiled
-def grid_axis_energy(x, nodes, width):  # type: ignore[no-untyped-def]
+def grid_axis_energy(x, nodes, width):
     """The factor of one input in phi'phi of a network whose ``nodes`` per axis form a full grid over [-1, 1].
 
     phi = exp(-|x - c|^2 / width^2) separates, so phi'phi is the product over the inputs.
@@ -26,7 +26,7 @@ def grid_axis_energy(x, nodes, width):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def diagonal_energy(inputs, nodes, width):  # type: ignore[no-untyped-def]
+def diagonal_energy(inputs, nodes, width):
     """phi'phi of a network with ``nodes`` centres (c, c, .., c), c equally spaced over [-1, 1], for a tuple of inputs.
 
     phi = exp(-|x - c|^2 / width^2), eq. (3.19).
@@ -42,19 +42,19 @@ def diagonal_energy(inputs, nodes, width):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def learned_gain(estimate, energy, scale):  # type: ignore[no-untyped-def]
+def learned_gain(estimate, energy, scale):
     """What the estimate adds to the gain on the error: estimate phi'phi / (2 scale^2), eqs. (3.38), (6.37)."""
     return estimate * energy / (2.0 * scale * scale)
 
 
 @compiled
-def adaptation_rate(estimate, error, energy, scale, gain, leak):  # type: ignore[no-untyped-def]
+def adaptation_rate(estimate, error, energy, scale, gain, leak):
     """Rate of the estimate with leak: gain (error^2 phi'phi / (2 scale^2) - leak estimate), eqs. (3.40), (3.57)."""
     return gain * (error * error * energy / (2.0 * scale * scale) - leak * estimate)
 
 
 @compiled
-def adaptation_step(estimate, error, energy, scale, gain, leak, h):  # type: ignore[no-untyped-def]
+def adaptation_step(estimate, error, energy, scale, gain, leak, h):
     """The estimate after a step of length ``h`` of `adaptation_rate`, eqs. (6.38)-(6.39).
 
     Steps itself, the leak implicitly: never below zero.
@@ -63,7 +63,7 @@ def adaptation_step(estimate, error, energy, scale, gain, leak, h):  # type: ign
 
 
 @compiled
-def adapt_neuron(weights, n, activation, error, gain, leak, h):  # type: ignore[no-untyped-def]
+def adapt_neuron(weights, n, activation, error, gain, leak, h):
     """One Euler step of the weights (n, 3) of a neuron of a network with three outputs, eqs. (8.27), (8.39).
 
     W' = gain (activation error - leak W). Modifies ``weights[n]``.

@@ -19,7 +19,7 @@ __all__ = [
 
 
 @compiled
-def disturbance_observer_rate(gain, error, state, known, reference_rate):  # type: ignore[no-untyped-def]
+def disturbance_observer_rate(gain, error, state, known, reference_rate):
     """Rate of the state xi of a first-order disturbance observer, eqs. (4.16), (5.20), (5.32), (5.36).
 
     For error' = known + d - reference_rate, with ``known`` = f + g u of the input that acts, the estimate
@@ -29,7 +29,7 @@ def disturbance_observer_rate(gain, error, state, known, reference_rate):  # typ
 
 
 @compiled
-def discrete_disturbance_observer_step(estimate, disturbance, measured, explained, w, h):  # type: ignore[no-untyped-def]
+def discrete_disturbance_observer_step(estimate, disturbance, measured, explained, w, h):
     """A sampled observer of d in x' = ``explained`` + d, with bandwidth ``w`` (rad/s; not in the monograph).
 
     The gains are 1 - z^2 and (1 - z)^2 with z = exp(-w h), close to which its two poles lie while w h is small. A
@@ -46,7 +46,7 @@ def discrete_disturbance_observer_step(estimate, disturbance, measured, explaine
 
 
 @compiled
-def unexplained_acceleration(gain, rate, state, explained):  # type: ignore[no-untyped-def]
+def unexplained_acceleration(gain, rate, state, explained):
     """Estimate of the part of an acceleration that ``explained`` does not account for (not in the monograph).
 
     For rate' = explained + d, the estimate d_hat = gain (rate - state) obeys d_hat' = gain (d - d_hat).
@@ -60,7 +60,7 @@ def unexplained_acceleration(gain, rate, state, explained):  # type: ignore[no-u
 
 
 @compiled
-def reference_system_step(model, gap, value, derivative, rate, explained, gain, bound, h):  # type: ignore[no-untyped-def]
+def reference_system_step(model, gap, value, derivative, rate, explained, gain, bound, h):
     """Sliding-mode estimate of the part of an acceleration that a model does not explain: chapter 9 [R].
 
     The reference system model' = explained + gain gap, gap = rate - model, makes gap' = d - gain gap; a Levant
@@ -81,7 +81,7 @@ def reference_system_step(model, gap, value, derivative, rate, explained, gain, 
 
 
 @compiled
-def sliding_mode_observer(disagreement, beta1, beta2, phi):  # type: ignore[no-untyped-def]
+def sliding_mode_observer(disagreement, beta1, beta2, phi):
     """Rate of a distributed reference estimate, eqs. (3.20), (5.12), with sign smoothed to tanh(./phi).
 
     ``disagreement`` is sum_j a_ij (own - neighbour's). ``beta2`` must exceed the reference's largest rate.
@@ -96,7 +96,7 @@ def sliding_mode_observer(disagreement, beta1, beta2, phi):  # type: ignore[no-u
 
 
 @compiled
-def finite_time_observer(rate, disagreement, rate_disagreement, beta1, beta2, beta3, beta4, exponent, kappa):  # type: ignore[no-untyped-def]
+def finite_time_observer(rate, disagreement, rate_disagreement, beta1, beta2, beta3, beta4, exponent, kappa):
     """Rates of a distributed finite-time estimate of position and velocity, eqs. (6.22)-(6.23).
 
     ``rate`` is the velocity estimate, the disagreements are sum_j a_ij (own - neighbour's) of position and velocity;

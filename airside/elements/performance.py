@@ -14,14 +14,14 @@ EDGE = 0.98
 
 
 @compiled
-def performance_tube(t, first, last, decay):  # type: ignore[no-untyped-def]
+def performance_tube(t, first, last, decay):
     """Half-width (first - last) exp(-decay t) + last of the tube ``t`` seconds after its start; its rate. (3.25)"""
     excess = (first - last) * math.exp(-decay * t)
     return excess + last, -decay * excess
 
 
 @compiled
-def performance_transform(error, error_rate, width, width_rate, lower, upper):  # type: ignore[no-untyped-def]
+def performance_transform(error, error_rate, width, width_rate, lower, upper):
     """Transformed error of a tube -lower width < error < upper width, eqs. (3.26)-(3.29), with its guard `EDGE`.
 
     Returns
@@ -39,7 +39,7 @@ def performance_transform(error, error_rate, width, width_rate, lower, upper):  
 
 
 @compiled
-def bounded_transform(error, width, lower, upper, edge, continued):  # type: ignore[no-untyped-def]
+def bounded_transform(error, width, lower, upper, edge, continued):
     """Transformed error and its slope, eqs. (7.20), (8.16)-(8.17), guarded beyond the share ``edge`` of the tube.
 
     There the slope is that at the guard. With ``continued`` = 1 the transformed error goes on along it, else it stays.
@@ -57,7 +57,7 @@ def bounded_transform(error, width, lower, upper, edge, continued):  # type: ign
 
 
 @compiled
-def bounded_transforms(errors, width, lower, upper, edge, continued):  # type: ignore[no-untyped-def]
+def bounded_transforms(errors, width, lower, upper, edge, continued):
     """`bounded_transform` of three axes in one tube: the three transformed errors, the three slopes."""
     first, first_slope = bounded_transform(errors[0], width, lower, upper, edge, continued)
     second, second_slope = bounded_transform(errors[1], width, lower, upper, edge, continued)

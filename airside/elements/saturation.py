@@ -12,13 +12,13 @@ __all__ = ["auxiliary_step", "linear_auxiliary_rate", "squared_auxiliary_step", 
 
 
 @compiled
-def linear_auxiliary_rate(state, gain, effectiveness, saturated, wanted):  # type: ignore[no-untyped-def]
+def linear_auxiliary_rate(state, gain, effectiveness, saturated, wanted):
     """Rate of a linear auxiliary system, eqs. (4.19), (5.33), (5.39): -gain state + g (sat(u) - u)."""
     return -gain * state + effectiveness * (saturated - wanted)
 
 
 @compiled
-def auxiliary_step(state, gain, error, excess, threshold, h):  # type: ignore[no-untyped-def]
+def auxiliary_step(state, gain, error, excess, threshold, h):
     """The state after a step of length ``h`` of a nonlinear auxiliary system, eq. (3.54) with Remark 3.3.
 
     state' = -gain state - (|error excess| + 0.5 excess^2)/state + excess where abs(state) >= threshold, else 0; with
@@ -34,7 +34,7 @@ def auxiliary_step(state, gain, error, excess, threshold, h):  # type: ignore[no
 
 
 @compiled
-def squared_auxiliary_step(state, gain, error, excess, threshold, h):  # type: ignore[no-untyped-def]
+def squared_auxiliary_step(state, gain, error, excess, threshold, h):
     """As `auxiliary_step`, eqs. (6.46), (6.78), for saturation that lasts: the square of the state is what is stepped.
 
     The state keeps its sign and never falls below its threshold once it has reached it (rates up to 1e7 1/s).
@@ -48,7 +48,7 @@ def squared_auxiliary_step(state, gain, error, excess, threshold, h):  # type: i
 
 
 @compiled
-def vector_auxiliary_step(state, gain, power, excess, floor, h):  # type: ignore[no-untyped-def]
+def vector_auxiliary_step(state, gain, power, excess, floor, h):
     """The state (three axes) after a step of length ``h`` of a nonlinear auxiliary system, eqs. (8.29), (8.41).
 
     state' = -(gain + (power + 0.5 |excess|^2)/max(|state|^2, floor)) state + excess; ``power`` is the rate at which the

@@ -188,14 +188,14 @@ def new_profile_state(profile: Profile) -> NDArray[np.float64]:
 
 
 @compiled
-def armed(triggers, state):  # type: ignore[no-untyped-def]
+def armed(triggers, state):
     """In-edge of the leader whose position the next trigger waits for; -1: the own position, -2: none is left."""
     n = int(state[FIRED])
     return int(triggers[n, 0]) if n < triggers.shape[0] and triggers[n, 1] < math.inf else -2
 
 
 @compiled
-def _command(commands, triggers, state, time):  # type: ignore[no-untyped-def]
+def _command(commands, triggers, state, time):
     latest = 0
     for n in range(commands.shape[0]):
         if commands[n, 0] <= time:
@@ -207,7 +207,7 @@ def _command(commands, triggers, state, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _filtered(phi, start, value, rate, target):  # type: ignore[no-untyped-def]
+def _filtered(phi, start, value, rate, target):
     offset = value - target
     return (
         target + phi[start] * offset + phi[start + 1] * rate,
@@ -216,7 +216,7 @@ def _filtered(phi, start, value, rate, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cosine(parameters, time):  # type: ignore[no-untyped-def]
+def _cosine(parameters, time):
     since = time - parameters[_COSINE_AT]
     if not since >= 0.0:
         return 0.0, 0.0, 0.0
@@ -229,7 +229,7 @@ def _cosine(parameters, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _climb_filtered(parameters, state, altitude, falling, period):  # type: ignore[no-untyped-def]
+def _climb_filtered(parameters, state, altitude, falling, period):
     """Advance the altitude filter; its rate less that of the cosine (``falling``) obeys the limits."""
     before = state[_Z]
     state[_Z], state[_Z_RATE] = _filtered(parameters, _Z_PHI, state[_Z], state[_Z_RATE], altitude)
@@ -248,7 +248,7 @@ def _forward(V: float, z_dot: float) -> float:
 
 
 @compiled
-def refer(parameters, commands, triggers, state, reference, seen, now_us, period_us):  # type: ignore[no-untyped-def]
+def refer(parameters, commands, triggers, state, reference, seen, now_us, period_us):
     """Advance a profile to the tick at ``now_us`` and write its `Reference`; to be called once at every tick.
 
     ``seen`` is the present forward position of the leader that `armed` names, nan if unknown; unused for the own one.
@@ -290,7 +290,7 @@ def refer(parameters, commands, triggers, state, reference, seen, now_us, period
 
 
 @compiled
-def stand(state, reference, period_us):  # type: ignore[no-untyped-def]
+def stand(state, reference, period_us):
     """Hold: fly on level at the present altitude and speed; to be called instead of `refer`."""
     state[_X] += reference[6] * period_us / 1e6
     reference[0] = state[_X]
@@ -382,7 +382,7 @@ def _sampled(profiles: tuple[tuple[int, Profile], ...], duration: float, period:
 
 
 @compiled
-def _sample(parameters, commands, triggers, states, row, seen, period_us, rows):  # type: ignore[no-untyped-def]
+def _sample(parameters, commands, triggers, states, row, seen, period_us, rows):
     """Fly all profiles tick by tick into ``rows`` (k, n, 7); ``row`` (k, 7) and ``seen`` (k,) are scratch."""
     period = period_us / 1e6
     for n in range(rows.shape[1]):

@@ -236,13 +236,13 @@ _NODES = 5
 
 
 @compiled
-def _adapted(k, c1, energy, zeta1, c2, zeta2):  # type: ignore[no-untyped-def]
+def _adapted(k, c1, energy, zeta1, c2, zeta2):
     """Gain on an error: the fixed one, and those learned of the network and of the bound."""
     return k + learned_gain(c1, energy, zeta1) + learned_gain(c2, 1.0, zeta2)
 
 
 @compiled
-def _evaluate(s, own, V, gamma, alpha, q, model, g):  # type: ignore[no-untyped-def]
+def _evaluate(s, own, V, gamma, alpha, q, model, g):
     """Eqs. (6.31)-(6.78) for the states ``s`` as they stand."""
     speed, path, attack = (V - 30.0) / 5.0, gamma / 0.2, alpha / 0.2
 
@@ -283,7 +283,7 @@ def _evaluate(s, own, V, gamma, alpha, q, model, g):  # type: ignore[no-untyped-
 
 
 @compiled
-def _learned(estimate, error, energy, zeta, rate, leak, learns, cap, h):  # type: ignore[no-untyped-def]
+def _learned(estimate, error, energy, zeta, rate, leak, learns, cap, h):
     """An adapted gain after ``h`` seconds; held unless ``learns``."""
     if not learns:
         return estimate
@@ -291,7 +291,7 @@ def _learned(estimate, error, energy, zeta, rate, leak, learns, cap, h):  # type
 
 
 @compiled
-def _estimated(place, speed, neighbours, ahead, g):  # type: ignore[no-untyped-def]
+def _estimated(place, speed, neighbours, ahead, g):
     """Rates of the estimates of one axis (6.22)-(6.23), ``ahead`` seconds after the tick, see `motion_sums`."""
     weights, places, speeds = neighbours
     away = weights * place - (places + ahead * speeds)
@@ -299,7 +299,7 @@ def _estimated(place, speed, neighbours, ahead, g):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elevator, g, h):  # type: ignore[no-untyped-def]
+def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elevator, g, h):
     """One internal step of length ``h``, ``ahead`` seconds after the tick, with the evaluation ``law`` held."""
     x_rate, Vx_rate = _estimated(s.x_hat, s.Vx_hat, forward, ahead, g)
     z_rate, Vz_rate = _estimated(s.z_hat, s.Vz_hat, vertical, ahead, g)
@@ -363,7 +363,7 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
 
 
 @compiled
-def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
     """One tick: the state ``dt`` later, by internal steps with the evaluation of the tick held, and the output."""
     V, gamma, alpha, q = own.V, own.gamma, own.alpha, own.q
     if gains.prediction > 0.0:
@@ -388,13 +388,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 
 @compiled
-def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """What the neighbours hear, for the instant of ``state``."""
     return state.x_hat, state.Vx_hat, state.z_hat, state.Vz_hat
 
 
 @compiled
-def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
     errors = (output.S1, output.S2, output.S3, output.S4, output.S5, output.S6)
     return (*state[:4], *errors, *state[4:14], output.thrust_wanted, output.elevator_wanted)

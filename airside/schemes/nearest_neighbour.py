@@ -190,7 +190,7 @@ _LEAST_AIRSPEED = 5.0
 
 
 @compiled
-def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt):  # type: ignore[no-untyped-def]
+def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt):
     """Eqs. (4.16)-(4.50) for the states ``s`` as they stand and a reference (V_d, z_d) in speed and altitude."""
     V = own.V
     divisor = max(V, _LEAST_AIRSPEED)
@@ -281,7 +281,7 @@ def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt
 
 
 @compiled
-def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d, begun):  # type: ignore[no-untyped-def]
+def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d, begun):
     observers, auxiliary = (0.0, 0.0, 0.0), (0.0, 0.0)
     reference = (V, z, V, V_rate, z, z_rate)
     acceleration = (0.0, own.V, 0.0)
@@ -298,7 +298,7 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
 
 
 @compiled
-def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
     """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output.
 
     At the first tick the filters are set: that of the reference at the neighbours' mean, those of the commands at what
@@ -353,13 +353,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 
 @compiled
-def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """What the neighbours hear, for the instant of ``state``."""
     return own.V, output.V_rate, own.z, own.V * math.sin(own.gamma)
 
 
 @compiled
-def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
     reference_tracked = (own.V - output.S1, own.z - output.S2)
     estimates = (output.d1_hat, output.d2_hat, output.lumped_hat)

@@ -232,7 +232,7 @@ _LEAST_AIRSPEED = 5.0
 
 
 @compiled
-def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[no-untyped-def]
+def _evaluate(s, own, total, V_rate, reference, model, gains):
     """Eqs. (3.7)-(3.57) for the states ``s`` as they stand; ``total`` is the disagreement with the neighbours."""
     V, gamma = own.V, own.gamma
     divisor = max(V, _LEAST_AIRSPEED)
@@ -335,7 +335,7 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):  # type: ignore[n
 
 
 @compiled
-def _initial(own, z_d, gamma_d, theta_d, q_d, u_l):  # type: ignore[no-untyped-def]
+def _initial(own, z_d, gamma_d, theta_d, q_d, u_l):
     adapted, integral = (0.0, 0.0, 0.0), 0.0
     filters = (own.theta, 0.0, 0.0, 0.0, own.z, 0.0, z_d, 0.0)
     estimator = (own.q, -own.elevator)
@@ -362,7 +362,7 @@ def _capped(estimate: float, cap: float) -> float:
 
 
 @compiled
-def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):  # type: ignore[no-untyped-def]
+def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
     """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output."""
     s = state
     total, _, _ = disagreement(s.z_d, heard, 0.0, gains.horizon, gains.z_unheard, gains.in_flight)
@@ -414,13 +414,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 
 @compiled
-def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """What the neighbours hear, for the instant of ``state``."""
     return state.z_d, output.v_ref
 
 
 @compiled
-def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):  # type: ignore[no-untyped-def]
+def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
     z_r = state.z_r if gains.smoother > 0.0 else state.z_d
     z_h = state.z_h if gains.altitude_filter > 0.0 else own.z

@@ -36,7 +36,7 @@ def heard(*neighbours: tuple[float, float, float, float], valid: float = 1.0) ->
 NEIGHBOURS = heard((1000.4, 0.3, 0.05, 0.4), (1001.1, -0.2, 0.1, 0.5), (1003.0, 1.5, 0.05, 0.9))
 
 
-def step(state, aircraft, gains, neighbours=NEIGHBOURS, dt=DT):  # type: ignore[no-untyped-def]
+def step(state, aircraft, gains, neighbours=NEIGHBOURS, dt=DT):
     """One plain-Python step."""
     return LAW.step(state, aircraft, neighbours, MISSION, MODEL, gains, dt)
 
@@ -101,7 +101,7 @@ def test_at_the_published_start_a_neighbour_never_heard_stands_at_1000_m():
 # One evaluation.
 
 
-def printed_rates(s, o, neighbours, g):  # type: ignore[no-untyped-def]
+def printed_rates(s, o, neighbours, g):
     """The derivatives of the printed law, eqs. (5.12), (5.18)-(5.39), and its two commands."""
     a, m = AIRFRAME, AIRFRAME.m
     alpha, pressure = o.theta - o.gamma, 0.5 * AIRFRAME.rho * o.V**2 * AIRFRAME.S
@@ -156,7 +156,7 @@ def printed_rates(s, o, neighbours, g):  # type: ignore[no-untyped-def]
     return rates, T, elevator, wanted
 
 
-def states(count: int):  # type: ignore[no-untyped-def]
+def states(count: int):
     """States of law and aircraft near and far from equilibrium: the saturations act in some of them."""
     random = np.random.default_rng(1)
     for n in range(count):

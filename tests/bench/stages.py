@@ -60,7 +60,7 @@ def _flyer(mission: Mission) -> Any:
     )  # fmt: skip
 
     @numba.njit
-    def fly(vehicles, pilots, timing, first, last, room, spent):  # type: ignore[no-untyped-def]
+    def fly(vehicles, pilots, timing, first, last, room, spent):
         every = range(vehicles.alive.shape[0])
         for tick in range(first, last):
             now_us = tick * timing.period_us

@@ -65,7 +65,7 @@ def swarm(dashboard: Dashboard) -> Iterator[Swarm]:
 
 
 @pytest.fixture
-def browser(tmp_path):  # type: ignore[no-untyped-def]
+def browser(tmp_path):
     webdriver = pytest.importorskip("selenium.webdriver")
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium")
@@ -89,7 +89,7 @@ def browser(tmp_path):  # type: ignore[no-untyped-def]
     driver.quit()
 
 
-def picture(browser) -> np.ndarray:  # type: ignore[no-untyped-def]
+def picture(browser) -> np.ndarray:
     """What the page shows, shape (rows, columns, 3)."""
     image = pytest.importorskip("PIL.Image")
     return np.asarray(image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")).astype(int)
@@ -100,21 +100,21 @@ def colored(pixels: np.ndarray) -> float:
     return float((pixels.max(axis=2) - pixels.min(axis=2) > 40).mean())
 
 
-def open_page(browser, address: str, theme: str) -> None:  # type: ignore[no-untyped-def]
+def open_page(browser, address: str, theme: str) -> None:
     browser.execute_cdp_cmd(
         "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
     )
     browser.get(f"{address}&renderer=webgl")
 
 
-def wait_until_drawn(browser) -> None:  # type: ignore[no-untyped-def]
+def wait_until_drawn(browser) -> None:
     deadline = time.monotonic() + 120.0
     while time.monotonic() < deadline and colored(picture(browser)[SCENE]) < 0.002:
         time.sleep(1.0)
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_the_scene_is_drawn_and_advances_while_the_swarm_flies(dashboard, swarm, browser, theme):  # type: ignore[no-untyped-def]
+def test_the_scene_is_drawn_and_advances_while_the_swarm_flies(dashboard, swarm, browser, theme):
     assert dashboard.address is not None
     open_page(browser, dashboard.address, theme)
     wait_until_drawn(browser)
@@ -135,7 +135,7 @@ def test_the_scene_is_drawn_and_advances_while_the_swarm_flies(dashboard, swarm,
     assert (background.mean() > 128) == (theme == "light")
 
 
-def test_the_page_reaches_nobody_but_this_machine(dashboard, swarm, browser):  # type: ignore[no-untyped-def]
+def test_the_page_reaches_nobody_but_this_machine(dashboard, swarm, browser):
     """The page tries to send usage statistics; the browser refuses because of the policy that comes with the page."""
     assert dashboard.address is not None
     open_page(browser, dashboard.address, "dark")

@@ -286,7 +286,7 @@ def test_a_cut_does_not_shift_the_draws_of_the_records_after_it():
 def test_plain_python_and_compiled_code_pass_the_same_records():
     channel = Channel(0.3, 0.1, 0.3, 0.8, 0.02, 0.2)
 
-    def books(through, listen) -> Inbox:  # type: ignore[no-untyped-def]
+    def books(through, listen) -> Inbox:
         inbox = new_inbox([[7]], [1], 1, channel)
         for n in range(300):
             now = n * EXCHANGE + LATENCY

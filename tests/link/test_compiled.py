@@ -184,11 +184,11 @@ def test_a_template_gives_instances_of_its_own(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
 
     @compiled
-    def half(x):  # type: ignore[no-untyped-def]
+    def half(x):
         return 0.5 * x
 
     @compiled
-    def square(x):  # type: ignore[no-untyped-def]
+    def square(x):
         return x * x
 
     first = instantiate("template_of_a_test", "half", element=half)

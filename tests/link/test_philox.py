@@ -13,7 +13,7 @@ from ftcc.link.philox import CHANNEL, NOISE, gaussian_pair, philox, uniform
 WORDS = 2**32 - 1
 
 
-def plain(function):  # type: ignore[no-untyped-def]
+def plain(function):
     """The Python function behind a compiled one."""
     return getattr(function, "py_func", function)
 

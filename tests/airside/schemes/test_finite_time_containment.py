@@ -23,7 +23,7 @@ ADAPTED = ("c11", "c12", "c21", "c22", "c31", "c32", "c41", "c42")
 HERE = heard((0.0, 30.0, 1000.0, 0.0))
 
 
-def begin(form: str, aircraft, neighbours=HERE, dt: float = 0.005, **gains: float):  # type: ignore[no-untyped-def]
+def begin(form: str, aircraft, neighbours=HERE, dt: float = 0.005, **gains: float):
     """Gains, state at the start, state and output after one step."""
     chosen = SCHEME.gains(form, gains)
     state = LAW.start(aircraft, neighbours, MISSION, MODEL, chosen)

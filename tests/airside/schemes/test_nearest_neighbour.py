@@ -46,7 +46,7 @@ HEARD_AT_START = {
 }
 
 
-def begin(form: str, aircraft, neighbours, dt: float = 0.005, **gains: float):  # type: ignore[no-untyped-def]
+def begin(form: str, aircraft, neighbours, dt: float = 0.005, **gains: float):
     """Gains, state after one step from the start, output."""
     chosen = SCHEME.gains(form, gains)
     state = LAW.start(aircraft, neighbours, MISSION, MODEL, chosen)

@@ -19,7 +19,7 @@ GRAPH = Graph((1, 2, 3), (4,), both_ways({(1, 2): 0.3, (1, 3): 0.5, (2, 3): 0.4}
 AGREEING = heard((1000.0, 0.0), (1000.0, 0.0))
 
 
-def begin(form: str, aircraft, neighbours=AGREEING, dt: float = 0.01, **gains: float):  # type: ignore[no-untyped-def]
+def begin(form: str, aircraft, neighbours=AGREEING, dt: float = 0.01, **gains: float):
     """Gains, state at the start, state and output after one step."""
     chosen = SCHEME.gains(form, gains)
     state = LAW.start(aircraft, neighbours, MISSION, MODEL, chosen)
