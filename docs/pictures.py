@@ -15,15 +15,15 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from ftcc.groundside.dashboard.replay import draw_run
 from ftcc.groundside.dashboard.viewer import viewer_program
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.replay import draw
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import sheet_of
 from ftcc.groundside.report.report import draw_figures
-from ftcc.groundside.run import Run
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.results.run import Run
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import simulate
 
 PICTURES = Path(__file__).parent / "pictures"
 DASHBOARDS = (
@@ -48,7 +48,7 @@ def small(image: Image.Image, path: Path) -> None:
 
 def dashboard(run: Run, folder: Path, path: Path, t: float) -> None:
     """What the dashboard shows of a run at ``t``."""
-    recording = draw(run, folder / f"{path.stem}.rrd", rate=5.0)
+    recording = draw_run(run, folder / f"{path.stem}.rrd", rate=5.0)
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

@@ -93,7 +93,11 @@ def _holder(file: Any) -> str:
 def _source_files() -> list[Path]:
     root = Path(__file__).resolve().parent.parent
     found = [path for package in _PACKAGES for path in (root / package).rglob("*.py")]
-    found += [path for name in ("flight_loop.py", "catalogue.py") if (path := root / "groundside" / name).is_file()]
+    found += [
+        path
+        for name in ("simulation/flight_loop.py", "scenario/catalogue.py")
+        if (path := root / "groundside" / name).is_file()
+    ]
     for entry in importlib.metadata.entry_points(group=SCHEME_ENTRY_POINTS):
         spec = importlib.util.find_spec(entry.module.split(".")[0])
         for place in (spec.submodule_search_locations or []) if spec else []:

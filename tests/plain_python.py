@@ -11,8 +11,8 @@ import sys
 import numpy as np
 
 from ftcc.groundside import load, resolve
-from ftcc.groundside.scenario import forms_and_variants, read, shipped
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.scenario.loading import forms_and_variants, read, shipped
+from ftcc.groundside.simulation.one_process import fly_in_memory
 
 CASES = [(name, form) for name, path in shipped().items() for form in forms_and_variants(read(path))[0]]
 
@@ -23,7 +23,7 @@ def digest(scenario: str, form: str, seconds: float) -> str:
     mission = resolve(
         load(scenario, form=form, duration=seconds, settings=[f"record_rate={1e6 / mission.timing.period_us}"])
     )
-    flight = fly(mission)
+    flight = fly_in_memory(mission)
     assert not flight.lost, flight.lost
     hashed = hashlib.sha256()
     for array in (flight.truth, flight.command, flight.acting, flight.signals):

@@ -21,7 +21,7 @@ from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
-from ftcc.groundside.simulate import loop_of
+from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel, Inbox
 from ftcc.link.graph import Graph

@@ -102,7 +102,7 @@ def test_one_module_imports_numba():
 def test_what_is_forked_has_loaded_neither_mesh_nor_ground():
     """A child of a process that had opened Zenoh never sends; rerun starts threads."""
     program = (
-        "import sys, threading; import ftcc.groundside.preload\n"
+        "import sys, threading; import ftcc.groundside.swarm.preload\n"
         f"print(*[name for name in {sorted(NOT_BEFORE_THE_FORK)!r} if name in sys.modules])\n"
         "assert threading.active_count() == 1, threading.enumerate()\n"
         "import psutil; assert not psutil.Process().net_connections(), 'a socket is open'"

@@ -15,8 +15,8 @@ from ftcc.groundside import Run, ScenarioError, load, resolve
 from ftcc.groundside.cli.scenarios import list_all
 from ftcc.groundside.dashboard.panels import panels_of
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.mission import Mission
-from ftcc.groundside.simulate import PlainPython, simulate
+from ftcc.groundside.scenario.mission import Mission
+from ftcc.groundside.simulation.one_process import PlainPython, simulate
 from tests.guests import EXAMPLE, forget_schemes, install
 from tests.sitl.conftest import same_flight
 

@@ -33,18 +33,20 @@ def loaded(program: str, **environment: str) -> set[str]:
 def test_what_is_forked_has_loaded_nothing_that_its_children_do_not_need():
     """Whatever it loads costs every swarm its start."""
     found = loaded(
-        "import ftcc.groundside.preload", FTCC_PRELOAD_SCHEME="containment", FTCC_PRELOAD_PLANT="longitudinal"
+        "import ftcc.groundside.swarm.preload", FTCC_PRELOAD_SCHEME="containment", FTCC_PRELOAD_PLANT="longitudinal"
     )
     assert {"numba", "pyarrow"} <= found
     assert not found & GROUND
-    assert not [name for name in found if name.startswith(("ftcc.groundside.schema", "ftcc.groundside.scenario"))]
+    assert not [
+        name for name in found if name.startswith(("ftcc.groundside.schema", "ftcc.groundside.scenario.loading"))
+    ]
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads as Linux shows them")
 def test_what_is_forked_has_no_threads():
     """Not Python's alone: of those that a library starts, such as Arrow's allocator, no child would have any."""
     loaded(
-        "import os, ftcc.groundside.preload\nassert len(os.listdir('/proc/self/task')) == 1",
+        "import os, ftcc.groundside.swarm.preload\nassert len(os.listdir('/proc/self/task')) == 1",
         FTCC_PRELOAD_SCHEME="containment",
         FTCC_PRELOAD_PLANT="longitudinal",
         OPENBLAS_NUM_THREADS="1",

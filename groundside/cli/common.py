@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ftcc.groundside.claims import Result
-    from ftcc.groundside.mission import Mission
-    from ftcc.groundside.scenario import Scenario
+    from ftcc.groundside.scenario import Mission, Scenario
     from ftcc.groundside.verdict import Verdict
 
 __all__ = [
@@ -46,7 +45,7 @@ __all__ = [
 
 def scenario_names(incomplete: str) -> list[str]:
     """The shipped scenarios that begin so, for the shell's completion."""
-    from ftcc.groundside.catalogue import shipped
+    from ftcc.groundside.scenario import shipped
 
     return [name for name in shipped() if name.startswith(incomplete)]
 
@@ -155,7 +154,7 @@ def load_mission(
     """The mission that the options ask for; its warnings go to the user."""
     scenario = load_scenario(name, form, variant, settings, seed, duration)
     with _loading():
-        from ftcc.groundside.mission import resolve
+        from ftcc.groundside.scenario import resolve
 
         mission = resolve(scenario)
     for text in mission.warnings:
@@ -165,7 +164,7 @@ def load_mission(
 
 def new_run_folder(mission: Mission, out: Path | None) -> Path:
     """The folder of a new run, created."""
-    from ftcc.groundside.run import new_folder
+    from ftcc.groundside.results import new_folder
 
     return new_folder(mission.name, out)
 
@@ -173,7 +172,7 @@ def new_run_folder(mission: Mission, out: Path | None) -> Path:
 def show_claims(folder: Path) -> None:
     """Merge the recording of a run if need be and print how its claims stand."""
     from ftcc.groundside import report
-    from ftcc.groundside.run import Run, RunError
+    from ftcc.groundside.results import Run, RunError
 
     try:
         results = report.claims_of(Run(folder))

@@ -116,7 +116,7 @@ def _plants() -> Table:
 def _flown_by() -> dict[str, list[str]]:
     """The shipped scenarios, and those variants that change the aircraft, by plant."""
     from ftcc.airside import schemes
-    from ftcc.groundside.catalogue import forms_and_variants, read, shipped
+    from ftcc.groundside.scenario import forms_and_variants, read, shipped
 
     flown: dict[str, list[str]] = {}
     for name, path in shipped().items():

@@ -33,8 +33,8 @@ from ftcc.groundside.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from ftcc.groundside.registry import Entry
-    from ftcc.groundside.snapshot import Pace
+    from ftcc.groundside.dashboard import Pace
+    from ftcc.groundside.swarm import Entry
     from ftcc.link.addresses import Address
 
 __all__ = ["doctor", "fly", "ps", "stop"]
@@ -47,7 +47,7 @@ _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 
 
 def _pack(text: str, uavs: int) -> int:
-    from ftcc.groundside.launcher import automatic_pack
+    from ftcc.groundside.swarm import automatic_pack
 
     if text == "auto":
         return automatic_pack(uavs)
@@ -134,7 +134,7 @@ def fly(
     strict: Strict = False,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
-    from ftcc.groundside.fly import Clock, Viewer
+    from ftcc.groundside.swarm import Clock, Viewer
 
     factor = speed_factor(speed, "--speed")
     if clock not in get_args(Clock):
@@ -152,15 +152,13 @@ def fly(
     _check_systems(max(uavs), id_offset)
     _check_key(key, [uav + id_offset for uav in uavs])
 
-    from ftcc.groundside.open_files import provide_files
-    from ftcc.groundside.registry import check_name
+    from ftcc.groundside.swarm import check_name, provide_files
 
     provide_files(mission, count, len(listeners))
     check_name(f"{mission.name}-20000101-000000-2" if out is None else out.name)
 
-    from ftcc.groundside.fly import FlightOptions
-    from ftcc.groundside.fly import fly as fly_mission
-    from ftcc.groundside.snapshot import Event
+    from ftcc.groundside.dashboard import Event
+    from ftcc.groundside.swarm import FlightOptions, fly_swarm
     from ftcc.link.ports import PortError, reserve
 
     try:
@@ -211,7 +209,7 @@ def fly(
     with bar:
         task = bar.add_task("starting", total=mission.timing.duration, pace="")
         try:
-            outcome = fly_mission(mission, options, ports, say, show_progress, started)
+            outcome = fly_swarm(mission, options, ports, say, show_progress, started)
         except TimeoutError as error:
             console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
             raise typer.Exit(_FLIGHT_FAILED) from error
@@ -240,10 +238,10 @@ def fly(
 
 def _how_it_flies(entry: Entry) -> str:
     """Held, or how many times real time, and what limits it."""
-    from ftcc.groundside.registry import tell
+    from ftcc.groundside.swarm import ask_swarm
 
     try:
-        told = tell(entry, "status") or {}
+        told = ask_swarm(entry, "status") or {}
     except (OSError, RuntimeError):
         return "does not answer"
     if told.get("state") != "flying" or told.get("factor") is None:
@@ -253,9 +251,9 @@ def _how_it_flies(entry: Entry) -> str:
 
 def ps() -> None:
     """List the running swarms."""
-    from ftcc.groundside.registry import running
+    from ftcc.groundside.swarm import running_swarms
 
-    entries = running()
+    entries = running_swarms()
     if not entries:
         terminal().print("no swarm is running")
         return
@@ -278,10 +276,10 @@ _Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps
 
 
 def _tell(name: str | None, command: str) -> None:
-    from ftcc.groundside.registry import find, tell
+    from ftcc.groundside.swarm import ask_swarm, find_swarm
 
     try:
-        tell(find(name), command)
+        ask_swarm(find_swarm(name), command)
     except LookupError as error:
         fail(str(error))
     except (OSError, RuntimeError) as error:
@@ -291,9 +289,9 @@ def _tell(name: str | None, command: str) -> None:
 
 def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all swarms.")] = False) -> None:
     """End a running swarm in order; its run stays complete up to now."""
-    from ftcc.groundside.registry import running
+    from ftcc.groundside.swarm import running_swarms
 
-    names: list[str | None] = [entry.name for entry in running()] if every else [name]
+    names: list[str | None] = [entry.name for entry in running_swarms()] if every else [name]
     for one in names:
         _tell(one, "stop")
 
@@ -306,7 +304,7 @@ def doctor(
     speed: Annotated[str, typer.Option(help="Times real time that are wanted, or 'max'.")] = "1",
 ) -> None:
     """Say what this machine has, and, by flying a scenario for some seconds, how fast it flies it."""
-    from ftcc.groundside.doctor import examine
+    from ftcc.groundside.swarm import examine
 
     factor = speed_factor(speed, "--speed")
     mission = load_mission(scenario, None, variant, None, None, None)

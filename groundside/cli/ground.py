@@ -15,7 +15,7 @@ from ftcc.groundside.cli.common import fail, speed_factor, terminal, warn
 from ftcc.link.text import as_seconds
 
 if TYPE_CHECKING:
-    from ftcc.groundside.station import Station
+    from ftcc.groundside.swarm import Station
 
 __all__ = [
     "attitude",
@@ -53,7 +53,7 @@ keys = typer.Typer(name="keys", no_args_is_help=True, help="Keys of signed links
 @contextmanager
 def _station(swarm: str | None, key: Path | None) -> Iterator[Station]:
     """A station; a refusal ends with exit code 1, a vehicle that is not there with 2."""
-    from ftcc.groundside.station import RefusedError, Station
+    from ftcc.groundside.swarm import RefusedError, Station
 
     with Station(swarm, key=key) as station:
         try:
@@ -71,7 +71,7 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
     """List the UAVs of a running swarm, the UDP port at which each is called, and what they tell of themselves."""
     from rich.table import Table
 
-    from ftcc.groundside.station import NoAnswerError
+    from ftcc.groundside.swarm import NoAnswerError
 
     table = Table("UAV", "port", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
     silent = False
@@ -307,10 +307,10 @@ _HOLDING = 10.0
 
 
 def _tell(name: str | None, command: str, **arguments: float | None) -> None:
-    from ftcc.groundside.registry import find, tell
+    from ftcc.groundside.swarm import ask_swarm, find_swarm
 
     try:
-        tell(find(name), command, **arguments)
+        ask_swarm(find_swarm(name), command, **arguments)
     except LookupError as error:
         fail(str(error))
     except (OSError, RuntimeError) as error:
@@ -319,12 +319,12 @@ def _tell(name: str | None, command: str, **arguments: float | None) -> None:
 
 
 def _wait_until_held(name: str | None) -> None:
-    from ftcc.groundside.registry import find, tell
+    from ftcc.groundside.swarm import ask_swarm, find_swarm
 
     until = time.monotonic() + _HOLDING
     while time.monotonic() < until:
         try:
-            status = tell(find(name), "status")
+            status = ask_swarm(find_swarm(name), "status")
         except (LookupError, OSError, RuntimeError) as error:
             fail(f"the swarm has ended before it was held ({error})")
         if status["state"] == "held":

@@ -25,9 +25,8 @@ def report(
 ) -> None:
     """Show what a run recorded, its verdict and whether its scenario's claims hold; exit code 1 if one fails."""
     from ftcc.groundside.claims import failed
-    from ftcc.groundside.report import as_json, claims_of, show
-    from ftcc.groundside.report.report import write_report
-    from ftcc.groundside.run import NothingRecordedError, Run, RunError
+    from ftcc.groundside.report import as_json, claims_of, show, write_report
+    from ftcc.groundside.results import NothingRecordedError, Run, RunError, export
 
     recorded = Run(run)
     exports = {"csv": csv, "mat": mat, "kml": kml, "gpx": gpx, "ulog": ulog}
@@ -48,7 +47,7 @@ def report(
     for kind, file in exports.items():
         if file is not None:
             try:
-                made = recorded.export(kind, file)
+                made = export(recorded, kind, file)
             except OSError as error:
                 raise RunError(f"--{kind} {file}: cannot be written: {error.strerror or error}") from None
             written.print(f"wrote {', '.join(map(str, made))}", highlight=False, soft_wrap=True)
@@ -68,8 +67,8 @@ def compare(
     from rich.table import Table
     from rich.text import Text
 
-    from ftcc.groundside.report.comparison import Comparison
-    from ftcc.groundside.run import Run, RunError
+    from ftcc.groundside.report import Comparison
+    from ftcc.groundside.results import Run, RunError
 
     if len(runs) < 2:
         raise RunError("compare needs two runs or more")

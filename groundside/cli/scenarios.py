@@ -38,7 +38,7 @@ def list_all() -> None:
     from rich.table import Table
 
     from ftcc.airside import schemes
-    from ftcc.groundside.catalogue import shipped, summary
+    from ftcc.groundside.scenario import shipped, summary
 
     def table(*headings: str) -> Table:
         made = Table(header_style="bold", box=None, pad_edge=False)
@@ -62,8 +62,8 @@ def list_all() -> None:
 
 def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", settings: Settings = None) -> None:
     """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
-    from ftcc.groundside.cases import cases_of, load_case
-    from ftcc.groundside.mission import resolve
+    from ftcc.groundside.scenario import resolve
+    from ftcc.groundside.simulation import cases_of, load_case
 
     first = load_scenario(scenario, form, variant, settings)
     cases = {first.case: first}
@@ -103,8 +103,8 @@ def simulate(
     from rich.progress import BarColumn, Progress, TextColumn
 
     from ftcc.groundside.claims import evaluate
-    from ftcc.groundside.run import RunError
-    from ftcc.groundside.simulate import simulate as simulate_mission
+    from ftcc.groundside.results import RunError
+    from ftcc.groundside.simulation import simulate as simulate_mission
 
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     folder = new_run_folder(mission, out)
@@ -144,9 +144,9 @@ def verify(
     settings: Settings = None,
 ) -> None:
     """Fly every case that a scenario makes claims for, in one process, unrecorded; exit code 1 if a claim fails."""
-    from ftcc.groundside.cases import cases_of, claims_in_flight, load_case
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import claims_table, summary
+    from ftcc.groundside.simulation import cases_of, claims_in_flight, load_case
 
     first = load_scenario(scenario, None, "", settings)
     out = terminal()

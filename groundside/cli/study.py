@@ -44,7 +44,7 @@ def study(
         TimeRemainingColumn,
     )
 
-    from ftcc.groundside.run import new_folder
+    from ftcc.groundside.results import new_folder
     from ftcc.groundside.study import draw, fly_all, plan_study, summary, write
 
     jobs = len(os.sched_getaffinity(0)) if jobs is None and hasattr(os, "sched_getaffinity") else jobs or os.cpu_count()

@@ -11,9 +11,8 @@ import typer
 from ftcc.groundside.cli.common import fail, terminal, warn
 
 if TYPE_CHECKING:
-    from ftcc.groundside.dashboard import Dashboard
-    from ftcc.groundside.run import Run
-    from ftcc.groundside.snapshot import Event
+    from ftcc.groundside.dashboard import Dashboard, Event
+    from ftcc.groundside.results import Run
 
 __all__ = ["replay", "show_past", "watch"]
 
@@ -40,15 +39,13 @@ def watch(
     browser: _Browser = True,
 ) -> None:
     """Show a running swarm, what it has flown and what it goes on to; Ctrl-C detaches, and the swarm flies on."""
-    from ftcc.groundside.dashboard import Dashboard, Subject
-    from ftcc.groundside.feed import watched
-    from ftcc.groundside.registry import find
-    from ftcc.groundside.replay import events_of
-    from ftcc.groundside.run import Run
+    from ftcc.groundside.dashboard import Dashboard, Subject, events_of, watched
+    from ftcc.groundside.results import Run
+    from ftcc.groundside.swarm import find_swarm
 
     kind = _kind(viewer)
     try:
-        entry = find(name)
+        entry = find_swarm(name)
     except LookupError as error:
         fail(str(error))
     run = Run(entry.folder)
@@ -83,8 +80,8 @@ def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
 
     A viewer that does not keep up is spared the rest.
     """
-    from ftcc.groundside.replay import snapshots_of
-    from ftcc.groundside.run import NothingRecordedError
+    from ftcc.groundside.dashboard import snapshots_of
+    from ftcc.groundside.results import NothingRecordedError
 
     told: list[Event] = []
     try:
@@ -107,9 +104,9 @@ def replay(
     draw: Annotated[bool, typer.Option("--draw", help="Draw the dashboard's recording anew from the signals.")] = False,
 ) -> None:
     """Show a recorded run in the dashboard; Ctrl-C ends it."""
-    from ftcc.groundside.dashboard.viewer import Viewer
-    from ftcc.groundside.replay import draw as draw_recording
-    from ftcc.groundside.run import Run
+    from ftcc.groundside.dashboard import Viewer
+    from ftcc.groundside.dashboard import draw_run as draw_recording
+    from ftcc.groundside.results import Run
 
     kind = _kind(viewer)
     recorded = Run(run)

@@ -1,6 +1,5 @@
-"""The live dashboard in Rerun: the swarm in space, its graph, its curves, its events."""
+"""The live dashboard in Rerun: snapshots of the swarm, and what is drawn of them; a recorded run again."""
 
-from ftcc.groundside.dashboard.dashboard import Dashboard
-from ftcc.groundside.dashboard.subject import Subject
+import lazy_loader
 
-__all__ = ["Dashboard", "Subject"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,10 +8,10 @@ from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import PaceCurve
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
+from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.table import Table, events
 from ftcc.groundside.dashboard.viewer import BLUEPRINT, Entry
-from ftcc.groundside.snapshot import Snapshot
 
 __all__ = ["Artists"]
 

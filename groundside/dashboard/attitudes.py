@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
+from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import label
 from ftcc.groundside.palette import colors
-from ftcc.groundside.snapshot import Snapshot
 from ftcc.link.rotation import body_axes
 
 __all__ = ["Attitudes"]

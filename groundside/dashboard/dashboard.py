@@ -11,9 +11,9 @@ import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ftcc.groundside.dashboard.snapshot import Event, Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry, Kind, Viewer, write
-from ftcc.groundside.snapshot import Event, Snapshot
 
 if TYPE_CHECKING:
     import rerun as rr

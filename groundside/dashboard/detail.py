@@ -15,9 +15,9 @@ So the calls that make a picture do not grow with the swarm, only the arrays in 
 
 from __future__ import annotations
 
+from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.words import in_trouble
-from ftcc.groundside.snapshot import Snapshot
 
 __all__ = ["FULL", "Detail"]
 

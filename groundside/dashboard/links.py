@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.shapes import arrows
+from ftcc.groundside.dashboard.snapshot import LinkState, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import silent_since
 from ftcc.groundside.palette import CUT, FRESH, STALE, colors
-from ftcc.groundside.snapshot import LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
 
 __all__ = ["Links"]

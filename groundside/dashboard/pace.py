@@ -8,9 +8,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ftcc.groundside.dashboard.plots import time_series
+from ftcc.groundside.dashboard.snapshot import Pace, Snapshot
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import GRAY, Color
-from ftcc.groundside.snapshot import Pace, Snapshot
 
 __all__ = ["PaceCurve", "in_words"]
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ftcc.airside.scheme import Quantity
+from ftcc.groundside.dashboard.snapshot import UavState
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.snapshot import UavState
 from ftcc.link.actuators import unit_of
 
 __all__ = ["Panel", "panels_of"]

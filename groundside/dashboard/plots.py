@@ -10,11 +10,11 @@ import rerun.blueprint as rrb
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.panels import Panel, panels_of, uavs_of
+from ftcc.groundside.dashboard.snapshot import Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import name
 from ftcc.groundside.palette import GRAY, Color, colors
-from ftcc.groundside.snapshot import Snapshot, UavState
 
 __all__ = ["WINDOW", "Plots", "time_series"]
 

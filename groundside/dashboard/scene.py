@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.links import Links
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
+from ftcc.groundside.dashboard.snapshot import Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.surroundings import Surroundings
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import is_silent, label
 from ftcc.groundside.palette import Color, colors
-from ftcc.groundside.snapshot import Snapshot, UavState
 
 __all__ = ["LANE", "TRAIL", "Scene"]
 

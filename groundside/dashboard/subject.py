@@ -14,7 +14,7 @@ from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.plants import find
 
 if TYPE_CHECKING:
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["Family", "Subject"]
 

@@ -9,10 +9,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
+from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import FIRE, GRAY
-from ftcc.groundside.snapshot import Snapshot
 
 __all__ = ["Surroundings"]
 

@@ -10,10 +10,10 @@ from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import in_words
+from ftcc.groundside.dashboard.snapshot import Event, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.dashboard.words import faults, faulty, in_trouble, is_silent, name, silent_since
-from ftcc.groundside.snapshot import Event, Snapshot, UavState
 
 __all__ = ["Table", "events", "log_view"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ftcc.groundside.snapshot import Pace, Snapshot, UavState
+from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 
 __all__ = ["faults", "faulty", "in_trouble", "is_silent", "label", "name", "silent_since"]
 

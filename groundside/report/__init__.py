@@ -1,13 +1,5 @@
-"""What a run showed, on the terminal and as JSON; a page with figures, see `report`, which loads matplotlib."""
+"""What a run showed: on the terminal, as JSON, and as a page with figures."""
 
-from ftcc.groundside.report.terminal import (
-    as_json,
-    claims_of,
-    claims_table,
-    show,
-    show_claims,
-    show_verdict,
-    summary,
-)
+import lazy_loader
 
-__all__ = ["as_json", "claims_of", "claims_table", "show", "show_claims", "show_verdict", "summary"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

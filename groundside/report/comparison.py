@@ -12,8 +12,7 @@ from ftcc.groundside.report.definitions import sheet_of
 from ftcc.groundside.report.page import Cell, Head, Page, Section, write
 from ftcc.groundside.report.report import draw_figures
 from ftcc.groundside.report.terminal import number
-from ftcc.groundside.run import Run
-from ftcc.groundside.sole_writer import sole_writer
+from ftcc.groundside.results import Run, sole_writer
 
 __all__ = ["Comparison", "labels_of"]
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.metrics import DERIVED, Signals, evaluated, names_in, uavs_in, window_of
+from ftcc.groundside.claims import DERIVED, Signals, evaluated, names_in, uavs_in, window_of
 from ftcc.groundside.report.definitions import Panel
 
 if TYPE_CHECKING:
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["Curve", "Flown", "curves_of", "drawable", "has", "last_time", "uavs_of"]
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from ftcc.groundside.claims import check_expression
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.metrics import check_expression
 from ftcc.groundside.schema import Id, Strict
 from ftcc.link.actuators import unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of", "unknown_columns"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
 from ftcc.groundside.canvas import Line2D, plt
-from ftcc.groundside.metrics import unwrapped
+from ftcc.groundside.claims import unwrapped
 from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
 from ftcc.groundside.report.definitions import Panel
@@ -24,7 +24,7 @@ from ftcc.link.actuators import SLOT
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["Drawn", "draw", "draw_timeline", "figure_of", "save"]
 

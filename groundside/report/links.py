@@ -13,7 +13,7 @@ from ftcc.groundside.report.page import Cell, Head, Section
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["links_section"]
 

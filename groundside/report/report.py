@@ -24,11 +24,10 @@ from ftcc.groundside.report.page import (
     write,
 )
 from ftcc.groundside.report.readings import compare
-from ftcc.groundside.run import NothingRecordedError, Run
-from ftcc.groundside.sole_writer import sole_writer
+from ftcc.groundside.results import NothingRecordedError, Run, sole_writer
 
 if TYPE_CHECKING:
-    from ftcc.groundside.mission import Mission
+    from ftcc.groundside.scenario import Mission
 
 __all__ = ["draw_figures", "write_report"]
 

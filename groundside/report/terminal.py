@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.claims import Result, evaluate
-from ftcc.groundside.run import Run
+from ftcc.groundside.results import Run
 from ftcc.groundside.text import ids
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict
 

@@ -1,8 +1,5 @@
 """Studies: one scenario flown many times, over values of its settings and seeds of its chance."""
 
-from ftcc.groundside.study.figure import draw
-from ftcc.groundside.study.flights import Outcome, fly_all
-from ftcc.groundside.study.plan import Study, StudyError, Trial, plan_study
-from ftcc.groundside.study.results import summary, table, write
+import lazy_loader
 
-__all__ = ["Outcome", "Study", "StudyError", "Trial", "draw", "fly_all", "plan_study", "summary", "table", "write"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ftcc.groundside.claims import Result, evaluate
-from ftcc.groundside.launcher import no_main_module
-from ftcc.groundside.run import Run
-from ftcc.groundside.simulate import Flight, PlainPython, fly, simulate
+from ftcc.groundside.results import Run
+from ftcc.groundside.simulation import Flight, PlainPython, fly_in_memory, simulate
 from ftcc.groundside.study.plan import Study, Trial
+from ftcc.groundside.swarm import no_main_module
 from ftcc.groundside.verdict import Verdict
 
 __all__ = ["Outcome", "fly_all", "run_folder"]
@@ -109,7 +109,7 @@ def fly_all(
         with _heard_ctrl_c() as go_on:
             # Compiled once here, or by every process at the same time.
             timing = study.mission.timing._replace(ticks=0)
-            fly(dataclasses.replace(study.mission, timing=timing))
+            fly_in_memory(dataclasses.replace(study.mission, timing=timing))
             go_on()
             if ready is not None:
                 ready()
@@ -283,7 +283,9 @@ def _flown(work: _Work, trial: Trial) -> Outcome:
     begun = time.perf_counter()
     try:
         flight: Flight | Run = (
-            fly(mission, go_on) if record_in is None else simulate(mission, run_folder(record_in, trial), go_on)
+            fly_in_memory(mission, go_on)
+            if record_in is None
+            else simulate(mission, run_folder(record_in, trial), go_on)
         )
         results = evaluate(flight, mission.claims, mission.case, mission.graph)
         verdict = flight.verdict

@@ -13,8 +13,7 @@ from typing import Any
 import tomli_w
 
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.scenario import Scenario, ScenarioError, load
+from ftcc.groundside.scenario import Mission, Scenario, ScenarioError, load, resolve
 
 __all__ = ["Combination", "Study", "StudyError", "Trial", "Variation", "plan_study"]
 

@@ -1,6 +1,5 @@
 """How a flight went, in a few lines and one word."""
 
-from ftcc.groundside.verdict.judge import judge
-from ftcc.groundside.verdict.verdict import AS_IT_SHOULD, FAILED, FILE, REMARKS, Verdict, size
+import lazy_loader
 
-__all__ = ["AS_IT_SHOULD", "FAILED", "FILE", "REMARKS", "Verdict", "judge", "size"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -20,9 +20,9 @@ from ftcc.groundside.text import ids
 __all__ = [
     "AS_IT_SHOULD",
     "FAILED",
-    "FILE",
     "REMARKS",
     "SCHEMA_VERSION",
+    "VERDICT_FILE",
     "LimitCycle",
     "Loss",
     "Outside",
@@ -38,7 +38,7 @@ SCHEMA_VERSION = 1
 AS_IT_SHOULD, REMARKS, FAILED = "as it should be", "with remarks", "failed"
 """The words."""
 
-FILE = "verdict.json"
+VERDICT_FILE = "verdict.json"
 """In a run's folder."""
 
 _SEVERITY = {AS_IT_SHOULD: "info", REMARKS: "warning", FAILED: "error"}

@@ -11,7 +11,7 @@ from ftcc.airside import ranges
 from ftcc.airside.ranges import Range
 from ftcc.airside.schemes import find, names
 from ftcc.groundside import ScenarioError, load, resolve
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from ftcc.sim.plant import DIVERGED, LOST, NUMBER
 
 CASES = [(scheme, form) for scheme in names() for form in find(scheme).forms]
@@ -48,7 +48,7 @@ def test_no_gain_ends_in_a_number_that_is_none_without_a_word(scheme, form):
                 replace(spec, gains=tuple(law.gains_type(*spec.gains)._replace(**{name: value})))
                 for spec in mission.autopilots
             )
-            reasons = {why for _, why in fly(replace(mission, autopilots=changed)).lost.values()}
+            reasons = {why for _, why in fly_in_memory(replace(mission, autopilots=changed)).lost.values()}
             assert not reasons & NOT_A_NUMBER, f"{name} = {value}"
             walked += 1
     assert walked > 0

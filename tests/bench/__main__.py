@@ -24,11 +24,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.pace import usable_cores
-from ftcc.groundside.scenario import load, shipped
-from ftcc.groundside.simulate import fly as simulate_in_memory
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.scenario.loading import load, shipped
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.swarm.pace import usable_cores
 from tests.bench.flights import FTCC, Flight, fly
 from tests.bench.stages import LAW, stage_times
 from tests.bench.stubs import KINDS, StubResult, fly_stub
@@ -113,7 +112,7 @@ def in_one_process(repeats: int, swarms: Sequence[int], folder: Path) -> list[Ro
     for name in shipped():
         length = min(SIMULATED, load(name).plan.duration)
         mission = resolve(load(name, duration=length))
-        flown = median(partial(simulate_in_memory, mission), repeats)
+        flown = median(partial(fly_in_memory, mission), repeats)
         recorded = median(partial(simulate_anew, mission, folder), repeats)
         rows.append(
             {

@@ -16,8 +16,8 @@ from typing import get_args
 
 import psutil  # type: ignore[import-untyped]
 
-from ftcc.groundside.pace import Kind, PaceMeter, Sample, Setup, processes_of
-from ftcc.groundside.registry import find, tell
+from ftcc.groundside.swarm.pace import Kind, PaceMeter, Sample, Setup, processes_of
+from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 
 __all__ = ["FTCC", "Flight", "fly"]
 
@@ -92,7 +92,7 @@ def _watch(run: subprocess.Popen[bytes], folder: Path, duration: float) -> list[
             break
         time.sleep(_LOOK if samples else 0.05)
         try:
-            t = tell(find(folder.name), "status")["t"]
+            t = ask_swarm(find_swarm(folder.name), "status")["t"]
         except (LookupError, OSError):
             if samples:
                 break  # It is over.

@@ -15,7 +15,7 @@ import numpy as np
 from ftcc.airside.group import build_group as build_autopilots
 from ftcc.airside.group import flight_of as autopilot_flight
 from ftcc.airside.process import columns as signal_columns
-from ftcc.groundside.mission import Mission
+from ftcc.groundside.scenario.mission import Mission
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, SIMULATOR, Endpoint
 from ftcc.link.ports import reserve
 from ftcc.link.recording import LINK_COLUMNS, new_rows

@@ -6,9 +6,9 @@ import tomllib
 
 import pytest
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from tests.bench.stubs import KINDS, fly_stub
 from tests.bench.swarms import swarm_file
 
@@ -23,7 +23,7 @@ def test_swarms_of_all_sizes_can_fly(uavs, tmp_path):
 @pytest.mark.parametrize("uavs", [2, 8, 60])
 def test_swarms_fly_soundly(uavs, tmp_path):
     mission = resolve(load(str(swarm_file(tmp_path, uavs))))
-    flight = fly(mission)
+    flight = fly_in_memory(mission)
     assert not flight.lost
     for spec in mission.autopilots:
         if spec.role == "follower":

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 import tomli_w
 
-from ftcc.groundside.cases import claims_in_flight, load_case
-from ftcc.groundside.claims import Result
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.run import Run
-from ftcc.groundside.scenario import load, read, shipped
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.claims.claims import Result
+from ftcc.groundside.results import Run
+from ftcc.groundside.scenario.loading import load, read, shipped
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.cases import claims_in_flight, load_case
+from ftcc.groundside.simulation.one_process import simulate
 
 
 def mission_of(case: str, scenario: str = "containment", **options: Any) -> Mission:

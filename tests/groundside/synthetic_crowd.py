@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.snapshot import Event, LinkState, Pace, Snapshot, UavState
 from ftcc.link.graph import Graph
 from tests.groundside.synthetic_swarm import SUBJECT
 

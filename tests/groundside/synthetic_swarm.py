@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ftcc.airside.scheme import Quantity
+from ftcc.groundside.dashboard.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.snapshot import Event, LinkState, Snapshot, UavState
 from ftcc.link.graph import Graph
 
 FOLLOWERS = (1, 2, 3, 4, 5, 6)

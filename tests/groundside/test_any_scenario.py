@@ -21,8 +21,8 @@ from pydantic import BaseModel
 
 from ftcc.airside.schemes import find
 from ftcc.groundside import ScenarioError, load, resolve
-from ftcc.groundside.scenario import shipped
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.scenario.loading import shipped
+from ftcc.groundside.simulation.one_process import fly_in_memory
 
 TRIED = int(os.environ.get("FTCC_SCENARIOS", "60"))
 SECONDS = 2.0
@@ -134,7 +134,7 @@ def test_it_is_refused_with_a_sentence_or_flies(case: tuple[str, str, list[Chang
     ticks = min(mission.timing.ticks, round(SECONDS / mission.timing.period))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        flight = fly(replace(mission, timing=mission.timing._replace(ticks=ticks)))
+        flight = fly_in_memory(replace(mission, timing=mission.timing._replace(ticks=ticks)))
     for uav in mission.uavs:
         assert uav in flight.lost or np.isfinite(flight.column("z", uav)).all()
         assert all(math.isfinite(at) for at, _ in flight.lost.values())

@@ -10,12 +10,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ftcc.groundside.cases import claims_in_flight, load_case
-from ftcc.groundside.claims import Result
-from ftcc.groundside.metrics import unwrapped, wrapped
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.claims.claims import Result
+from ftcc.groundside.claims.metrics import unwrapped, wrapped
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.cases import claims_in_flight, load_case
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from tests.groundside.conftest import failing
 
 SYNCHRONIZED = ("monograph", "flight", "flight+bare", "flight+bare+off", "flight+loss_30", "monograph+traditional")
@@ -62,7 +62,7 @@ def test_an_inverted_swarm_rolls_upright_the_shorter_way(scenario: str, side: fl
         "disturbances=[]",
         "start.z=3000.0",
     ]
-    flight = fly(resolve(load(scenario, settings=settings, duration=8.0)))
+    flight = fly_in_memory(resolve(load(scenario, settings=settings, duration=8.0)))
     assert flight.lost == {}
     for uav in flight.mission.uavs:
         rolled = unwrapped(flight.column("mu", uav))

@@ -11,7 +11,7 @@ import pytest
 
 from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.detail import Detail
-from ftcc.groundside.snapshot import Snapshot
+from ftcc.groundside.dashboard.snapshot import Snapshot
 from tests.groundside.synthetic_swarm import SUBJECT, snapshot
 
 BANK, WANTED = 0.5, 0.2

@@ -14,9 +14,9 @@ from ftcc.groundside.dashboard.artists import Artists
 from ftcc.groundside.dashboard.detail import FULL, TROUBLED, Detail
 from ftcc.groundside.dashboard.links import Links
 from ftcc.groundside.dashboard.shapes import Poses, sticks
+from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import CUT
-from ftcc.groundside.snapshot import Pace, Snapshot, UavState
 from tests.groundside.synthetic_crowd import BROKEN, DEAF, SILENT, flight, graph, snapshot, subject
 
 DURATION = 60.0

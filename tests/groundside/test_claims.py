@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ftcc.groundside.claims import Result, check_claims, evaluate, tolerance_of
-from ftcc.groundside.metrics import METRICS, check_expression, evaluated
+from ftcc.groundside.claims.claims import Result, check_claims, evaluate, tolerance_of
+from ftcc.groundside.claims.metrics import METRICS, check_expression, evaluated
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 

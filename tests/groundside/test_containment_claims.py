@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ftcc.groundside.claims import Result
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.claims.claims import Result
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from tests.groundside.conftest import failing, mission_of
 
 PRINTED = ("monograph", "monograph+off")
@@ -145,7 +145,7 @@ def test_thirty_percent_loss_changes_nothing_by_more_than_one_percent(
 
 def test_the_seed_alone_decides_which_records_are_lost() -> None:
     first, again, other = (
-        fly(mission_of("flight+loss30", duration=30.0, seed=seed)).column("z", 3) for seed in (1, 1, 2)
+        fly_in_memory(mission_of("flight+loss30", duration=30.0, seed=seed)).column("z", 3) for seed in (1, 1, 2)
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)

@@ -27,9 +27,9 @@ from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.pace import in_words
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import LANE
+from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
 from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
-from ftcc.groundside.snapshot import Pace, Snapshot, UavState
 from ftcc.sim.obstacles import Obstacle
 from tests import rrd
 from tests.groundside.synthetic_swarm import (

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from ftcc.airside.autopilots import tick_of
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import Flight, fly, loop_of
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import Flight, fly_in_memory, loop_of
 
 
 def flown(datum: float) -> Flight:
     settings = [f"home.datum={datum}"]
-    return fly(resolve(load("containment", form="flight", variants=["P"], duration=110.0, settings=settings)))
+    return fly_in_memory(resolve(load("containment", form="flight", variants=["P"], duration=110.0, settings=settings)))
 
 
 def ripple(flight: Flight) -> float:

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from ftcc.groundside.doctor import Prediction, examine, predict, verdict
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.snapshot import Pace
+from ftcc.groundside.dashboard.snapshot import Pace
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.swarm.doctor import Prediction, examine, predict, verdict
 
 LIMITED = Pace(5.0, None, "all 2 cores are busy, most with autopilots: 1.2", "--pack auto")
 

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from ftcc.airside.references import attitude
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.scenario import ScenarioError, load
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.scenario.loading import ScenarioError, load
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from ftcc.sim.plant import Disturbance, Fault
 from ftcc.sim.wind import DiscreteGust
 
@@ -41,7 +41,7 @@ def test_a_disturbance_oscillates_and_ends() -> None:
         (5.0, 2, "disturbance d2 = 0.1 rad/s, oscillating with 2 rad/s"),
         (20.0, 2, "disturbance d2 over"),
     ]
-    d2 = fly(found).column("d2", 2)
+    d2 = fly_in_memory(found).column("d2", 2)
     shown = 0.1 * (1.0 - math.exp(-3.0 * 2.0)) * math.sin(2.0 * 2.0 + 0.5)
     assert (d2[499], d2[700], d2[2000]) == pytest.approx((0.0, shown, 0.0), abs=1e-12)
 
@@ -149,7 +149,9 @@ def test_turbulence_is_that_of_the_seed_and_of_the_uav() -> None:
     found = mission(settings)
     assert [vehicle.turbulence.deviation for vehicle in found.vehicles] == [(0.4, 0.5, 0.6)] * 2 + [(0.0,) * 3] * 6
     assert found.vehicles[0].turbulence.bandwidth == pytest.approx((0.1, 0.15, 0.3), rel=0.02)
-    flights = [fly(resolve(load("containment", duration=5.0, seed=seed, settings=[settings]))) for seed in (1, 1, 2)]
+    flights = [
+        fly_in_memory(resolve(load("containment", duration=5.0, seed=seed, settings=[settings]))) for seed in (1, 1, 2)
+    ]
     first, again, other = ([flight.column("wind_up", uav) for uav in (1, 2, 3)] for flight in flights)
     assert (first[0] == again[0]).all()
     assert (first[0] != first[1]).all()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from ftcc.groundside.run import Run
+from ftcc.groundside import Run, export
 from ftcc.link.home import Home
 
 KML = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
@@ -28,8 +28,8 @@ def places(run: Run, uav: int, row: int) -> tuple[float, float, float]:
 
 
 def test_gpx_and_kml_have_a_track_of_every_uav(demo_run: Run, tmp_path: Path) -> None:
-    demo_run.export("kml", tmp_path / "tracks.kml")
-    demo_run.export("gpx", tmp_path / "tracks.gpx")
+    export(demo_run, "kml", tmp_path / "tracks.kml")
+    export(demo_run, "gpx", tmp_path / "tracks.gpx")
     marks = ET.parse(tmp_path / "tracks.kml").findall("k:Document/k:Placemark", KML)
     tracks = ET.parse(tmp_path / "tracks.gpx").findall("g:trk", GPX)
     names = [f"UAV {uav}" for uav in range(1, 9)]
@@ -54,7 +54,7 @@ def test_gpx_and_kml_have_a_track_of_every_uav(demo_run: Run, tmp_path: Path) ->
 
 
 def test_ulog_holds_the_recording_and_what_px4_would_tell(demo_run: Run, tmp_path: Path) -> None:
-    files = demo_run.export("ulog", tmp_path / "logs")
+    files = export(demo_run, "ulog", tmp_path / "logs")
     assert [file.name for file in files] == [f"uav{uav}.ulg" for uav in range(1, 9)]
     log = ULog(str(files[3]))
     assert not log.file_corruption

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import pytest
 
 from ftcc.groundside import feed as feed_module
-from ftcc.groundside.feed import Feed, decoded, encoded, feed_path, watched
-from ftcc.groundside.snapshot import Event, LinkState, Pace, Snapshot
+from ftcc.groundside.dashboard.feed import Feed, decoded, encoded, feed_path, watched
+from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot
 from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot
 
 

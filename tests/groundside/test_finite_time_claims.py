@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import pytest
 
-from ftcc.groundside.cases import claims_in_flight, load_case
-from ftcc.groundside.claims import Result
-from ftcc.groundside.scenario import load
+from ftcc.groundside.claims.claims import Result
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.simulation.cases import claims_in_flight, load_case
 from tests.groundside.conftest import failing
 
 SCENARIO = "finite_time_containment"

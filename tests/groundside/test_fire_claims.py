@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import Scenario, ScenarioError, load
-from ftcc.groundside.simulate import fly, loop_of
+from ftcc.groundside.scenario.loading import Scenario, ScenarioError, load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory, loop_of
 from ftcc.sim.plants import conditions_of
 from tests.groundside.conftest import failing, mission_of
 
@@ -68,7 +68,7 @@ def test_what_the_first_period_under_trim_adds_to_the_first_error():
     loop.fly(world, mission.timing, mission.wire, 0, 1)
     first = world.autopilots.command.tolist()
     begun = tuple(replace(spec, command=tuple(one)) for spec, one in zip(mission.vehicles, first, strict=True))
-    flights = [fly(mission), fly(replace(mission, vehicles=begun))]
+    flights = [fly_in_memory(mission), fly_in_memory(replace(mission, vehicles=begun))]
     errors = [
         max(np.abs(flight.column(f"Pt_{axis}", uav)).max() for uav in mission.uavs for axis in "xyz")
         for flight in flights

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.flow import Flow, FlowError
+from ftcc.groundside.swarm.flow import Flow, FlowError
 from ftcc.link.gate import Limit, Pace
 
 

@@ -11,9 +11,9 @@ import pytest
 import tomli_w
 
 from ftcc.airside.references.profiles import Trigger
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.scenario import ScenarioError, load, read, shipped
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.scenario.loading import ScenarioError, load, read, shipped
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.one_process import simulate
 
 
 def mission(**options: Any) -> Mission:

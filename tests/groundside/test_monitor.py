@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from ftcc.groundside.monitor import Monitor
-from ftcc.groundside.snapshot import LinkState
-from ftcc.groundside.telemetry import ARRAY, HEARTBEAT, Ear, Told
+from ftcc.groundside.dashboard.snapshot import LinkState
+from ftcc.groundside.swarm.monitor import Monitor
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.mavlink import float_array
 from ftcc.link.modes import MISSION, custom_mode

@@ -10,8 +10,8 @@ import psutil
 import pytest
 
 from ftcc.groundside import ScenarioError, load, resolve
-from ftcc.groundside.mission import Mission
-from ftcc.groundside.simulate import TooLargeError, fly, simulate
+from ftcc.groundside.scenario.mission import Mission
+from ftcc.groundside.simulation.one_process import TooLargeError, fly_in_memory, simulate
 
 MISSION_AT_500 = ["start.z=500", "leaders.7.z=500", "leaders.8.z=500", "leaders.7.commands.0.altitude=600"]
 GUARDED = "start of UAV 1: flight-path angle left the model: gamma = 1.5 rad, plant.guards.flight_path_angle = 1 rad"
@@ -30,7 +30,7 @@ def refusal(name: str, *settings: str, form: str = "flight") -> str:
 @pytest.mark.parametrize("duration", ["0.05", "1e-4"])
 @pytest.mark.parametrize("name", ["nearest_neighbour", "containment", "finite_time_containment", "fire_monitoring"])
 def test_flights_shorter_than_the_grid_of_the_checks_are_flown(name: str, duration: str) -> None:
-    assert not fly(mission(name, f"duration={duration}")).lost
+    assert not fly_in_memory(mission(name, f"duration={duration}")).lost
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_it_is_warned_of(name: str, settings: list[str], said: str) -> None:
 def test_a_mission_at_another_altitude_is_the_same_flight() -> None:
     """The estimates start where the leaders do: what the law makes of a mission does not hang on its altitude."""
     usual, lower = mission("containment", duration=60.0), mission("containment", *MISSION_AT_500, duration=60.0)
-    one, other = fly(usual), fly(lower)
+    one, other = fly_in_memory(usual), fly_in_memory(lower)
     for uav in usual.uavs:
         climbed = [flight.column("z", uav) - flight.column("z", uav)[0] for flight in (one, other)]
         assert np.abs(climbed[0] - climbed[1]).max() < 1e-3
@@ -115,7 +115,7 @@ def test_a_mission_at_another_altitude_is_the_same_flight() -> None:
 def test_a_recording_that_does_not_fit_into_memory_is_refused() -> None:
     endless = mission("demo", "rates.control_rate=1000", "record_rate=1000", duration=1e5)
     with pytest.raises(TooLargeError, match=r"100000001 rows of 8 UAVs take \d+\.\d GB of memory"):
-        fly(endless)
+        fly_in_memory(endless)
 
 
 def test_a_recording_that_does_not_fit_on_the_disk_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

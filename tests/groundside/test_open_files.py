@@ -11,9 +11,9 @@ import pytest
 from ftcc.groundside import registry
 from ftcc.groundside.cli.app import main
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.open_files import TooFewFilesError, files_needed, provide_files
-from ftcc.groundside.scenario import load
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.swarm.open_files import TooFewFilesError, files_needed, provide_files
 
 
 class Limits:

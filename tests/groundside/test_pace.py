@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
-from ftcc.groundside.pace import Kind, Member, PaceMeter, Sample, Setup, judge, usable_cores
-from ftcc.groundside.snapshot import Pace
+from ftcc.groundside.dashboard.snapshot import Pace
+from ftcc.groundside.swarm.pace import Kind, Member, PaceMeter, Sample, Setup, judge, usable_cores
 
 STATION = Member("ground station", "ground station")
 VIEWER = Member("viewer 1", "viewer")

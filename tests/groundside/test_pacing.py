@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from ftcc.groundside.pace import Setup
-from ftcc.groundside.pacing import Pacing
+from ftcc.groundside.swarm.pace import Setup
+from ftcc.groundside.swarm.pacing import Pacing
 
 SETUP = Setup(asked=1.0, uavs=8, pack=1, automatic=8, cores=2)
 OWN = [("uav1-vehicle", os.getpid(), "vehicle")]

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.registry import Control, Entry, find, tell
+from ftcc.groundside.swarm.registry import Control, Entry, ask_swarm, find_swarm
 from ftcc.link.ports import runtime_folder
 
 
@@ -78,5 +78,5 @@ def serve_once(control: Control) -> None:
 def test_a_swarm_is_found_and_told(control: Control) -> None:
     server = threading.Thread(target=serve_once, args=(control,))
     server.start()
-    assert tell(find(None), "step", ticks=5) == 5
+    assert ask_swarm(find_swarm(None), "step", ticks=5) == 5
     server.join()

@@ -15,16 +15,16 @@ from pydantic import ValidationError
 
 from ftcc.airside import schemes
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.mission import Mission, resolve
 from ftcc.groundside.report.comparison import Comparison, labels_of
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import Panel, Sheet, plain_sheet, read_sheet, sheet_of, unknown_columns
 from ftcc.groundside.report.drawing import draw
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.report.report import write_report
-from ftcc.groundside.run import Run, RunError
-from ftcc.groundside.scenario import forms_and_variants, load, read, shipped
-from ftcc.groundside.simulate import fly, simulate
+from ftcc.groundside.results import Run, RunError
+from ftcc.groundside.scenario.loading import forms_and_variants, load, read, shipped
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
 
 SHEETS = sorted((Path(__file__).parents[2] / "groundside" / "report" / "figures").glob("*.toml"))
 
@@ -182,7 +182,7 @@ def test_a_sheet_draws_what_its_scheme_records(path: Path) -> None:
     mission = shipped_mission(path.stem)
     assert sheet.scenarios
     assert set(sheet.scenarios) <= set(shipped())
-    flight = fly(mission)
+    flight = fly_in_memory(mission)
     assert unknown_columns(sheet, flight.names) == []
     whole = [panel for figure in sheet.figures for panel in figure.panels if panel.window is None]
     made = draw(whole, [Flown("flight", flight, mission)])
@@ -198,7 +198,7 @@ def test_a_scheme_without_a_sheet_has_figures_of_what_it_declares() -> None:
     sheet = plain_sheet(mission)
     assert [figure.name for figure in sheet.figures] == ["motion", "errors", "estimates", "commands"]
     assert {panel.y for panel in sheet.figures[1].panels} == {"S1", "S5"}
-    assert unknown_columns(sheet, fly(mission).names) == []
+    assert unknown_columns(sheet, fly_in_memory(mission).names) == []
 
 
 def test_a_sheet_that_is_wrong_names_file_field_and_value(tmp_path: Path) -> None:
@@ -210,7 +210,7 @@ def test_a_sheet_that_is_wrong_names_file_field_and_value(tmp_path: Path) -> Non
 
 def test_readings_tell_what_agrees_and_by_how_much_others_differ() -> None:
     mission = resolve(load("containment", form="flight", duration=2.0))
-    flight = Flown("flight", fly(mission), mission)
+    flight = Flown("flight", fly_in_memory(mission), mission)
     base = {"what": "airspeed", "y": "V", "unit": "m/s", "window": (0.0, 2.0)}
     told = [
         base | {"monograph": (29.9, 30.1), "kind": "within"},
@@ -241,7 +241,7 @@ def test_only_an_angle_is_drawn_without_jumps_of_a_turn() -> None:
 
 def test_thinned_curves_keep_their_extremes() -> None:
     mission = shipped_mission("containment")
-    flight = fly(resolve(load("containment", form="monograph", duration=60.0)))
+    flight = fly_in_memory(resolve(load("containment", form="monograph", duration=60.0)))
     made = draw([Panel(y="V", label="V", uavs=[1])], [Flown("flight", flight, mission)])
     (line,) = (line for line in made.axes[0].lines if len(line.get_xdata()) > 10)
     drawn, recorded = np.asarray(line.get_ydata()), flight.column("V", 1)

@@ -14,9 +14,9 @@ import pytest
 from scipy.io import loadmat
 
 from ftcc.airside.process import columns as autopilot_columns
-from ftcc.groundside import Run, RunError, load, resolve
-from ftcc.groundside.run import new_folder
-from ftcc.groundside.simulate import fly, simulate
+from ftcc.groundside import Run, RunError, export, load, resolve
+from ftcc.groundside.results import new_folder
+from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
 from ftcc.link.recording import ROWS, PartWriter, part_path
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns as vehicle_columns
@@ -68,7 +68,7 @@ def test_units_and_meanings_stand_in_the_file(demo_run: Run) -> None:
 
 
 def test_the_recording_is_the_flight(demo_run: Run) -> None:
-    flight = fly(demo_run.mission)
+    flight = fly_in_memory(demo_run.mission)
     for name in ("t", "z", "elevator_command", "elevator", "S1"):
         for uav in (1, 6, 7):
             np.testing.assert_array_equal(demo_run.column(name, uav), flight.column(name, uav))
@@ -151,12 +151,12 @@ def test_the_rows_of_a_lost_uav_end_and_the_others_fly_on(tmp_path: Path) -> Non
 
 def test_csv_and_mat_hold_the_same_numbers(demo_run: Run, tmp_path: Path) -> None:
     short = simulate(resolve(load("demo", duration=1.0)), tmp_path / "short")
-    short.export_csv(tmp_path / "flight.csv")
+    export(short, "csv", tmp_path / "flight.csv")
     with (tmp_path / "flight.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 8 * 101
     assert float(rows[8]["z"]) == short.column("z", 1)[1]
-    short.export_mat(tmp_path / "flight.mat")
+    export(short, "mat", tmp_path / "flight.mat")
     contents: dict[str, Any] = loadmat(tmp_path / "flight.mat", squeeze_me=True)
     np.testing.assert_array_equal(contents["uav4"]["elevator"][()], short.column("elevator", 4))
     assert contents["units"]["gamma"][()] == "rad"

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import ScenarioError, load, shipped
-from ftcc.groundside.simulate import fly
+from ftcc.groundside.scenario.loading import ScenarioError, load, shipped
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory
 from ftcc.sim.airframe import Airframe
 
 Document = dict[str, Any]
@@ -40,7 +40,7 @@ def test_settings_come_after_variants_and_variants_after_the_form() -> None:
 )
 def test_integrals_adaptation_and_leaks_may_be_taken_out(scheme: str, gains: str, adapted: tuple[str, ...]) -> None:
     without = [f"gains.{gain}=0.0" for gain in gains.split()]
-    flight = fly(resolve(load(scheme, form="flight", duration=10.0, settings=without)))
+    flight = fly_in_memory(resolve(load(scheme, form="flight", duration=10.0, settings=without)))
     assert flight.lost == {}
     assert all((flight.column(signal, 1) == 0.0).all() for signal in adapted)
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import ScenarioError, load
+from ftcc.groundside.scenario.loading import ScenarioError, load
+from ftcc.groundside.scenario.mission import resolve
 
 Document = dict[str, Any]
 Edited = Callable[..., Path]

@@ -11,12 +11,12 @@ import pytest
 
 from ftcc.groundside.cli.app import main
 from ftcc.groundside.report.report import write_report
-from ftcc.groundside.run import Run, RunError, new_folder
-from ftcc.groundside.sole_writer import BusyFolderError, sole_writer
+from ftcc.groundside.results import Run, RunError, new_folder
+from ftcc.groundside.results.folders import BusyFolderError, sole_writer
 
 HOLD = """
 import sys, time
-from ftcc.groundside.run import new_folder
+from ftcc.groundside.results import new_folder
 new_folder("other", sys.argv[1])
 print("held", flush=True)
 time.sleep(60.0)

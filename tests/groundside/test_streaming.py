@@ -15,12 +15,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from ftcc.groundside import merging, run, simulate
-from ftcc.groundside.claims import evaluate
+from ftcc.groundside.claims.claims import evaluate
 from ftcc.groundside.cli.app import main
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.run import Run
-from ftcc.groundside.scenario import load
-from ftcc.groundside.table import TableWriter
+from ftcc.groundside.results import Run
+from ftcc.groundside.results.table import TableWriter
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import Mission, resolve
 
 SECONDS = 12.0
 
@@ -99,8 +99,8 @@ def peak(tmp_path: Path, seconds: float) -> float:
     program = (
         "import resource, sys\n"
         "from ftcc.groundside import simulate\n"
-        "from ftcc.groundside.mission import resolve\n"
-        "from ftcc.groundside.scenario import load\n"
+        "from ftcc.groundside.scenario.mission import resolve\n"
+        "from ftcc.groundside.scenario.loading import load\n"
         "simulate._BLOCK = 8 * 500\n"
         "def ended(*_): print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)\n"
         "simulate._concluded = ended\n"

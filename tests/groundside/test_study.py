@@ -17,10 +17,10 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from ftcc.groundside.cases import claims_in_flight
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.cases import claims_in_flight
 from ftcc.groundside.study import Outcome, draw, flights, fly_all, plan_study, table, write
 from tests.guests import EXAMPLE, forget_schemes, install
 
@@ -48,7 +48,7 @@ def short(document: dict[str, Any]) -> None:
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import tomli_w
 
-    from ftcc.groundside.scenario import read, shipped
+    from ftcc.groundside.scenario.loading import read, shipped
 
     document = read(shipped()["demo"])
     short(document)

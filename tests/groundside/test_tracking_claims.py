@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from ftcc.groundside.cases import claims_in_flight, load_case
-from ftcc.groundside.claims import Result
+from ftcc.groundside.claims.claims import Result
+from ftcc.groundside.simulation.cases import claims_in_flight, load_case
 from tests.groundside.conftest import failing
 
 PRESCRIBED = (

@@ -11,11 +11,11 @@ import pytest
 
 from ftcc.airside.scheme import Quantity
 from ftcc.groundside import Run
-from ftcc.groundside.mission import Mission, resolve
-from ftcc.groundside.replay import snapshots_of
-from ftcc.groundside.scenario import ScenarioError, load
-from ftcc.groundside.simulate import fly, simulate
-from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, FILE, REMARKS, Verdict, judge
+from ftcc.groundside.dashboard.replay import snapshots_of
+from ftcc.groundside.scenario.loading import ScenarioError, load
+from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, VERDICT_FILE, Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns, places
@@ -169,7 +169,7 @@ def test_a_flight_that_ended_before_its_time_has_a_remark() -> None:
 @pytest.mark.parametrize("scheme", ["demo", "nearest_neighbour", "finite_time_containment", "directed_attitude"])
 def test_every_tracking_error_of_a_scheme_can_be_said(scheme: str) -> None:
     mission = resolve(load(scheme, settings=["duration=0.5"]))
-    found = fly(mission).verdict
+    found = fly_in_memory(mission).verdict
     assert [one.name for one in found.tracking] == [one.name for one in mission.scheme.tracking]
     assert all(one.allowed is not None for one in found.tracking)
 
@@ -230,7 +230,7 @@ def test_a_recording_has_columns_of_the_actuators_that_there_are(scenario: str, 
 def test_the_demo_went_as_it_should(demo_run: Run) -> None:
     assert demo_run.verdict.word == AS_IT_SHOULD
     assert demo_run.events[-1]["text"] == "verdict: as it should be"
-    told = json.loads((demo_run.path / FILE).read_text())
+    told = json.loads((demo_run.path / VERDICT_FILE).read_text())
     assert told == json.loads(demo_run.verdict.dumps())
     assert told["verdict"] == AS_IT_SHOULD
 
@@ -238,7 +238,7 @@ def test_the_demo_went_as_it_should(demo_run: Run) -> None:
 def test_a_lower_loop_twice_as_slow_cycles_in_all_four_aircraft(tmp_path: Path) -> None:
     # Table of chapter 9's reference: "all three 2 x slower: limit cycle, n and mu to their limits".
     slow = ["plant.lag.thrust=10", "plant.lag.bank=2.5", "plant.lag.load_factor=4"]
-    flight = fly(resolve(load("fire_monitoring", settings=slow)))
+    flight = fly_in_memory(resolve(load("fire_monitoring", settings=slow)))
     assert flight.verdict.word == FAILED
     assert [one.uav for one in flight.verdict.limit_cycles] == [1, 2, 3, 4]
     assert all(1.0 < one.frequency < 6.0 for one in flight.verdict.limit_cycles)
@@ -251,6 +251,6 @@ def test_a_lower_loop_twice_as_slow_cycles_in_all_four_aircraft(tmp_path: Path) 
 
 @pytest.mark.parametrize("change", ["gains.k41=80", "plant.delay=5"])
 def test_gains_and_delays_that_destabilize_a_containment_flight_are_told(change: str) -> None:
-    found = fly(resolve(load("containment", settings=[change, "duration=120"]))).verdict
+    found = fly_in_memory(resolve(load("containment", settings=[change, "duration=120"]))).verdict
     assert found.word == FAILED
     assert {one.signal for one in found.limit_cycles} == {"elevator"}

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ftcc.groundside.scenario import load_airframe, shipped
+from ftcc.groundside.scenario.loading import load_airframe, shipped
 from ftcc.link.actuators import SLOT
 from ftcc.sim.inner_loop import load_factor
 from ftcc.sim.plant import TRUTH, Disturbance, Fleet

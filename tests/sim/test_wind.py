@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ftcc.groundside.wind import low_altitude
+from ftcc.groundside.scenario.wind import low_altitude
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import TRUTH, Disturbance, Fleet

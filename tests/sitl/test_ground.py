@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside import Run, Station
-from ftcc.groundside.registry import find
+from ftcc.groundside.swarm.registry import find_swarm
 from ftcc.link.codec import Codec, dialect
 from tests.sitl.conftest import Flight, events, same_flight
 
@@ -191,7 +191,7 @@ def strangers(ports: list[int], count: int, per_second: float) -> int:
 def test_strangers_on_every_port_change_nothing(fly: Callable[..., Flight], ftcc: Ftcc) -> None:
     """While a swarm flies in lockstep: it equals the simulation, and what came was counted."""
     flight = held(fly, "--duration", "20", "--set", "faults=[]")
-    entry = find(None)
+    entry = find_swarm(None)
     with Station() as station:
         before = {uav: station.parameters(uav) for uav in station.uavs}
     # Two seconds of wall time: it must not be over before they come.

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.feed import feed_path, watched
+from ftcc.groundside.dashboard.feed import feed_path, watched
 from tests.bench.swarms import swarm_file
 from tests.sitl.conftest import Flight, events, same_flight
 
@@ -19,9 +19,9 @@ DURATION = "30"
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Run folder of `ftcc simulate containment` with the given variants and seed."""
-    from ftcc.groundside.mission import resolve
-    from ftcc.groundside.scenario import load
-    from ftcc.groundside.simulate import simulate
+    from ftcc.groundside.scenario.loading import load
+    from ftcc.groundside.scenario.mission import resolve
+    from ftcc.groundside.simulation.one_process import simulate
 
     def run(variants: tuple[str, ...] = (), seed: int = 1) -> Path:
         folder = tmp_path_factory.mktemp("simulated") / "run"
@@ -91,9 +91,9 @@ def test_a_computer_that_is_too_slow_slows_time_down_and_loses_nobody(
     fly: Callable[..., Flight], busy_machine: None, tmp_path: Path, uavs: int, arguments: tuple[str, ...]
 ) -> None:
     """Asked for more than it can do, beside other programs: the flight is that of the simulation, only slower."""
-    from ftcc.groundside.mission import resolve
-    from ftcc.groundside.scenario import load
-    from ftcc.groundside.simulate import simulate
+    from ftcc.groundside.scenario.loading import load
+    from ftcc.groundside.scenario.mission import resolve
+    from ftcc.groundside.simulation.one_process import simulate
 
     swarm = swarm_file(tmp_path, uavs, duration=20.0)
     flight = fly(str(swarm), *arguments)
@@ -109,9 +109,9 @@ def test_plain_python_flies_the_same_flight_with_processes(
     fly: Callable[..., Flight], tmp_path: Path, environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same functions from datagram to datagram, not compiled."""
-    from ftcc.groundside.mission import resolve
-    from ftcc.groundside.scenario import load
-    from ftcc.groundside.simulate import simulate
+    from ftcc.groundside.scenario.loading import load
+    from ftcc.groundside.scenario.mission import resolve
+    from ftcc.groundside.simulation.one_process import simulate
 
     scenario = ("containment", "--variant", "loss30", "--duration", "1", "--speed", "max", "--pack", "4")
     environment["NUMBA_DISABLE_JIT"] = "1"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import simulate
 from tests.sitl.conftest import Flight, events, same_flight
 
 NEAR = (

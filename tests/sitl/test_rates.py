@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
-from ftcc.groundside.simulate import simulate
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.one_process import simulate
 from tests.sitl.conftest import Flight, same_flight
 
 EIGHTY = ["rates.control_rate=80", "rates.plant_step=0.0005", "record_rate=80"]

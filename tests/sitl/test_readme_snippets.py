@@ -22,8 +22,8 @@ import typer
 from ftcc.groundside import load, resolve
 from ftcc.groundside.cli import main
 from ftcc.groundside.cli.app import app
-from ftcc.groundside.registry import find, tell
-from ftcc.groundside.scenario import read, shipped
+from ftcc.groundside.scenario.loading import read, shipped
+from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 from tests.guests import EXAMPLE, forget_schemes, install
 from tests.sitl.conftest import FTCC, Flight
@@ -243,7 +243,7 @@ def test_a_swarm_takes_every_command_that_the_pages_give_it(
 def under_way() -> bool:
     """Whether the swarm answers, and has left the ground of t = 0."""
     try:
-        return float(tell(find(None), "status")["t"]) > 0.0
+        return float(ask_swarm(find_swarm(None), "status")["t"]) > 0.0
     except (LookupError, OSError, RuntimeError):
         return False
 

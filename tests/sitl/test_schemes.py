@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from ftcc.groundside.cases import load_case
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.simulate import simulate
-from ftcc.groundside.verdict import FILE
+from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation.cases import load_case
+from ftcc.groundside.simulation.one_process import simulate
+from ftcc.groundside.verdict import VERDICT_FILE
 from tests.sitl.conftest import Flight, events, same_flight
 
 
@@ -36,6 +36,6 @@ def test_processes_equal_the_simulation(
     flight = fly(scenario, "--variant", ",".join(variants), "--speed", "max", "--duration", f"{duration:g}")
     assert flight.wait(240) == 0, flight.output
     assert same_flight(flight.folder, tmp_path / "simulated")
-    assert (flight.folder / FILE).read_text() == (tmp_path / "simulated" / FILE).read_text()
+    assert (flight.folder / VERDICT_FILE).read_text() == (tmp_path / "simulated" / VERDICT_FILE).read_text()
     assert f"verdict: {simulated.verdict.word}" in flight.output
     assert simulated.verdict.text in [event["text"] for event in events(flight.folder)]

@@ -14,7 +14,7 @@ from tests.sitl.conftest import Flight
 INTERRUPTED = """
 import sys
 from ftcc.groundside.cli import main
-from ftcc.groundside.launcher import Swarm
+from ftcc.groundside.swarm.launcher import Swarm
 
 spawn = Swarm._spawn
 

@@ -17,9 +17,9 @@ import pytest
 from ftcc.groundside import Run, Station
 from ftcc.groundside.cli.view import show_past
 from ftcc.groundside.dashboard import Dashboard
+from ftcc.groundside.dashboard.feed import watched
+from ftcc.groundside.dashboard.snapshot import Event, Snapshot
 from ftcc.groundside.dashboard.viewer import viewer_program
-from ftcc.groundside.feed import watched
-from ftcc.groundside.snapshot import Event, Snapshot
 from tests import rrd
 from tests.sitl.conftest import Flight
 

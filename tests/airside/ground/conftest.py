@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ftcc.groundside.station import Station
+from ftcc.groundside.swarm.station import Station
 from tests.airside.autopilot_bench import Bench
 from tests.airside.ground.in_flight import flying
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ftcc.groundside.registry import Card, Entry
-from ftcc.groundside.station import Station
+from ftcc.groundside.swarm.registry import Card, Entry
+from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import dialect
 from ftcc.link.gate import Said
 from tests.airside.autopilot_bench import Bench, forged

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ftcc.groundside.conversation import RefusedError, StationError
+from ftcc.groundside.swarm.conversation import RefusedError, StationError
 from tests.airside.ground.in_flight import LEVEL, M, said
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from ftcc.airside.ground.commands import COMMANDS
 from ftcc.airside.ground.requests import MESSAGES
-from ftcc.groundside.conversation import RefusedError
+from ftcc.groundside.swarm.conversation import RefusedError
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
 from tests.airside.ground.in_flight import LEVEL, M, flying, said

@@ -16,9 +16,9 @@ from ftcc.airside.ground.commands import COMMANDS
 from ftcc.airside.ground.requests import MESSAGES
 from ftcc.airside.ground.streams import STREAMS
 from ftcc.airside.schemes import find
-from ftcc.groundside.conversation import NoAnswerError, RefusedError
-from ftcc.groundside.registry import Card, Entry
-from ftcc.groundside.station import Station
+from ftcc.groundside.swarm.conversation import NoAnswerError, RefusedError
+from ftcc.groundside.swarm.registry import Card, Entry
+from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import Codec
 from ftcc.link.failures import failure_answer, read_failure
 from ftcc.link.mavlink import LOOPBACK

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from ftcc.groundside.conversation import RefusedError
+from ftcc.groundside.swarm.conversation import RefusedError
 from ftcc.link.mavlink import LOOPBACK
 from tests.airside.ground.in_flight import LEVEL, M, ask, flying
 

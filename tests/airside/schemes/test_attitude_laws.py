@@ -16,8 +16,8 @@ from ftcc.airside.autopilots import build, tick_of
 from ftcc.airside.scheme import Flight
 from ftcc.airside.schemes import find
 from ftcc.airside.schemes.attitude_synchronization import _low_passed as low_passed
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
 from ftcc.link.graph import Graph, GraphError
 from ftcc.link.rotation import wrapped
 
@@ -224,10 +224,11 @@ def test_a_flight_in_plain_python_has_the_same_bits(law):
     """Four aircraft with loss and noise for the first tenth of a second, law and equations of motion."""
     program = (
         "import hashlib, numpy as np\n"
-        "from ftcc.groundside.mission import resolve\n"
-        "from ftcc.groundside.scenario import load\n"
-        "from ftcc.groundside.simulate import fly\n"
-        f"flight = fly(resolve(load({law!r}, settings=('channel.loss=0.3', 'noise.p=0.01'), duration=0.12)))\n"
+        "from ftcc.groundside.scenario.mission import resolve\n"
+        "from ftcc.groundside.scenario.loading import load\n"
+        "from ftcc.groundside.simulation.one_process import fly_in_memory\n"
+        f"scenario = load({law!r}, settings=('channel.loss=0.3', 'noise.p=0.01'), duration=0.12)\n"
+        "flight = fly_in_memory(resolve(scenario))\n"
         "assert np.isfinite(flight.signals).all()\n"
         "print(hashlib.sha256(flight.truth.tobytes() + flight.signals.tobytes()).hexdigest())"
     )

@@ -9,8 +9,8 @@ import pytest
 from ftcc.airside.autopilots import build
 from ftcc.airside.model import airspeed_model
 from ftcc.airside.schemes import find
-from ftcc.groundside.mission import resolve
-from ftcc.groundside.scenario import load
+from ftcc.groundside.scenario.loading import load
+from ftcc.groundside.scenario.mission import resolve
 from ftcc.link.channel import hear
 from ftcc.link.graph import Graph
 from tests.airside.schemes.flying import MISSION, both_ways, flight, heard, model, own

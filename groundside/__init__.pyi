@@ -1,0 +1,13 @@
+from .results import Run as Run
+from .results import RunError as RunError
+from .results import export as export
+from .scenario import Mission as Mission
+from .scenario import Scenario as Scenario
+from .scenario import ScenarioError as ScenarioError
+from .scenario import load as load
+from .scenario import resolve as resolve
+from .simulation import Flight as Flight
+from .simulation import fly_in_memory as fly_in_memory
+from .simulation import simulate as simulate
+from .swarm import Station as Station
+from .swarm import StationError as StationError

@@ -1,0 +1,16 @@
+from .claims import Result as Result
+from .claims import Tolerance as Tolerance
+from .claims import by_case as by_case
+from .claims import check_claims as check_claims
+from .claims import evaluate as evaluate
+from .claims import failed as failed
+from .claims import tolerance_of as tolerance_of
+from .claims import uavs_of as uavs_of
+from .metrics import DERIVED as DERIVED
+from .metrics import Signals as Signals
+from .metrics import check_expression as check_expression
+from .metrics import evaluated as evaluated
+from .metrics import names_in as names_in
+from .metrics import uavs_in as uavs_in
+from .metrics import unwrapped as unwrapped
+from .metrics import window_of as window_of

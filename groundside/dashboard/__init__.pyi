@@ -1,0 +1,13 @@
+from .dashboard import Dashboard as Dashboard
+from .feed import Feed as Feed
+from .feed import watched as watched
+from .replay import draw_run as draw_run
+from .replay import events_of as events_of
+from .replay import snapshots_of as snapshots_of
+from .snapshot import Event as Event
+from .snapshot import LinkState as LinkState
+from .snapshot import Pace as Pace
+from .snapshot import Snapshot as Snapshot
+from .snapshot import UavState as UavState
+from .subject import Subject as Subject
+from .viewer import Viewer as Viewer

@@ -1,0 +1,5 @@
+"""The folder of a run: the recording, read and written, and its exports."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

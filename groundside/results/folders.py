@@ -1,0 +1,122 @@
+"""Folders of results: a new one for each run, and one process at a time that writes into it."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import itertools
+import os
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+from ftcc.groundside.errors import UserError
+
+__all__ = ["BusyFolderError", "NothingRecordedError", "RunError", "new_folder", "sole_writer"]
+
+_kept: dict[tuple[int, int], int] = {}
+"""Descriptors of the folders that this process keeps to its end, by device and inode."""
+
+
+class BusyFolderError(UserError):
+    """Another process writes into the folder."""
+
+
+class RunError(UserError):
+    """A folder that is no run, or a run that cannot be read."""
+
+
+class NothingRecordedError(RunError):
+    """A run that ended before anything was recorded."""
+
+
+@contextlib.contextmanager
+def sole_writer(folder: Path) -> Iterator[None]:
+    """Be the only process that writes into ``folder``, which is created.
+
+    Raises
+    ------
+    BusyFolderError
+        If another one does.
+    OSError
+        If it cannot be created.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    descriptor = _locked(folder)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def keep(folder: Path) -> None:
+    """As `sole_writer`, of a folder that is there, until this process ends, however it ends."""
+    status = folder.stat()
+    place = status.st_dev, status.st_ino
+    if place not in _kept:
+        _kept[place] = _locked(folder)
+
+
+def _locked(folder: Path) -> int:
+    """A descriptor that holds the kernel's lock on a folder. It leaves no file behind."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise BusyFolderError(f"{folder}: another process is writing there; give another folder") from None
+    except OSError:
+        # Some network file systems lock no folders: there, two at the same time are not noticed.
+        pass
+    return descriptor
+
+
+_HELD = ("scenario.toml", "study.parquet")
+"""What shows that a folder has a run or a study in it."""
+
+
+def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> Path:
+    """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the present folder.
+
+    No other process gets it before this one ends.
+
+    Parameters
+    ----------
+    name : str
+    out : Path, optional
+    kind : str
+        Instead of ``runs``.
+
+    Raises
+    ------
+    RunError
+        If it cannot be written, or ``out`` already holds a run or a study.
+    BusyFolderError
+        If another process writes into it.
+    """
+    folder = Path(kind) if out is None else Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(f"no permission to write into {folder}")
+        if out is None:
+            folder = _first_free(folder / f"{name}-{datetime.now():%Y%m%d-%H%M%S}")
+        keep(folder)
+        held = [file for file in _HELD if (folder / file).exists()]
+    except OSError as error:
+        instead = "; name a folder that can be with --out" if out is None else ""
+        option = "" if out is None else "--out "
+        raise RunError(f"{option}{folder}: cannot be written: {error.strerror or error}{instead}") from None
+    if held:
+        raise RunError(f"--out {folder}: already holds {held[0]}; give a folder that is empty or does not exist")
+    return folder
+
+
+def _first_free(stem: Path) -> Path:
+    """Create the folder, or, where there is one already, that with the first free number."""
+    for n in itertools.count(2):
+        folder = stem if n == 2 else stem.with_name(f"{stem.name}-{n - 1}")
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+    raise AssertionError("numbers do not end")

@@ -1,0 +1,139 @@
+"""Joins what the processes of a swarm wrote into one table, block by block: a long flight takes no more memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.results.table import TableWriter
+from ftcc.link.recording import Column
+
+__all__ = ["merge_parts"]
+
+_BLOCK = 65536
+"""Rows, of all UAVs together, that are joined at a time."""
+
+
+class _Part:
+    """A part of the recording, read batch by batch, to its last one that is whole; not open in between."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+
+        self._path = path
+        self.uav = int(path.name.split("-")[0])
+        self.is_autopilot = path.stem.endswith("autopilot")
+        self.ended = False
+        self._batches: list[Any] = []
+        self._rows = 0
+        with path.open("rb") as file:
+            self.schema = pa.ipc.open_stream(file).schema
+            self._at = file.tell()
+
+    def fill(self, rows: int) -> None:
+        """Have so many rows at hand, or all that are left."""
+        import pyarrow as pa
+
+        if self._rows >= rows or self.ended:
+            return
+        with self._path.open("rb") as file:
+            file.seek(self._at)
+            messages = pa.ipc.MessageReader.open_stream(file)
+            while self._rows < rows and not self.ended:
+                try:
+                    batch = pa.ipc.read_record_batch(messages.read_next_message(), self.schema)
+                except (StopIteration, pa.ArrowInvalid, OSError, EOFError):
+                    # The end, or the batch in whose middle the writer was killed.
+                    self.ended = True
+                else:
+                    self._at = file.tell()
+                    self._batches.append(batch)
+                    self._rows += len(batch)
+
+    @property
+    def until(self) -> float:
+        """Time up to which its rows are at hand, s."""
+        return math.inf if self.ended else float(self._batches[-1].column("t")[-1].as_py())
+
+    def take(self, until: float) -> Any:
+        """The rows at hand up to a time, as a ``pyarrow.Table``."""
+        import pyarrow as pa
+
+        table = pa.Table.from_batches(self._batches, schema=self.schema)
+        count = int(np.searchsorted(table.column("t").to_numpy(), until, side="right"))
+        rest = table.slice(count)
+        self._batches, self._rows = rest.to_batches(), len(rest)
+        return table.slice(0, count)
+
+
+def merge_parts(folder: Path, target: Path, as_of: int) -> bool:
+    """Join the parts in ``folder`` on time and UAV, and write them into ``target``; False if there is not one row.
+
+    Where one of a UAV's two processes wrote nothing, the value is nan.
+
+    Parameters
+    ----------
+    folder : Path
+    target : Path
+    as_of : int
+        Time of change that the file is given, ns.
+    """
+    import pyarrow as pa
+
+    parts = []
+    for path in sorted(folder.glob("*.arrows")):
+        if not path.stem.endswith("-links"):
+            try:
+                parts.append(_Part(path))
+            except (pa.ArrowInvalid, OSError, EOFError):
+                continue  # not even a schema: killed as it began
+    # The vehicle's part first: its columns lead.
+    parts.sort(key=lambda part: (part.uav, part.is_autopilot))
+    columns = [
+        Column(f.name, f.metadata[b"unit"].decode(), f.metadata[b"meaning"].decode())
+        for part in sorted(parts, key=lambda part: part.is_autopilot)
+        for f in part.schema
+    ]
+    blocks = _blocks(parts, [column.name for column in columns])
+    first = next(blocks, None)
+    if first is None:
+        return False
+    with TableWriter(target, columns, as_of) as table:
+        table.write(first)
+        for block in blocks:
+            table.write(block)
+    return True
+
+
+def _blocks(parts: Sequence[_Part], names: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
+    """All rows by time, then UAV."""
+    uavs = sorted({part.uav for part in parts})
+    while parts and not all(part.ended for part in parts):
+        for part in parts:
+            part.fill(max(1, _BLOCK // len(uavs)))
+        until = min(part.until for part in parts)
+        tables = {uav: [part.take(until) for part in parts if part.uav == uav] for uav in uavs}
+        joined = [_joined(uav, tables[uav], names) for uav in uavs]
+        values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
+        if len(values["t"]):
+            order = np.lexsort((values["uav"], values["t"]))
+            yield {name: column[order] for name, column in values.items()}
+
+
+def _joined(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """The parts of one UAV side by side, a row for every time that occurs."""
+    times = [table.column("t").to_numpy() for table in tables]
+    t = np.unique(np.concatenate(times))
+    joined: dict[str, NDArray[Any]] = {name: np.full(len(t), np.nan) for name in names}
+    joined["t"], joined["uav"] = t, np.full(len(t), uav, np.int32)
+    for table, own in zip(tables, times, strict=True):
+        rows = np.searchsorted(t, own)
+        for name in table.column_names:
+            if name not in ("t", "uav"):
+                joined[name][rows] = table.column(name).to_numpy()
+    return joined

@@ -1,0 +1,66 @@
+"""``signals.parquet``: how it is written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from ftcc.groundside.scenario import LEADING
+from ftcc.link.recording import Column, arrow_schema
+
+__all__ = ["TableWriter"]
+
+
+def _ordered(columns: Sequence[Column]) -> list[Column]:
+    """Columns without repetition, the leading ones first."""
+    unique = {column.name: column for column in reversed(columns)}
+    first = [unique[name] for name in LEADING if name in unique]
+    rest = [column for column in dict.fromkeys(unique[c.name] for c in columns) if column.name not in LEADING]
+    return first + rest
+
+
+class TableWriter:
+    """Writes a table block by block: a Parquet file that appears when it is complete, and not where that fails.
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of Column
+        Of all parts, repetitions allowed.
+    as_of : int, optional
+        The file's time of change, ns; default: now.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[Column], as_of: int | None = None) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self._pa = pa
+        self._path, self._as_of = path, as_of
+        self._unfinished = path.with_suffix(f".{os.getpid()}")
+        self._columns = _ordered(columns)
+        self._schema = arrow_schema(self._columns)
+        options = {"use_dictionary": False, "compression": "lz4", "write_statistics": ["t", "uav"]}
+        self._file = pq.ParquetWriter(self._unfinished, self._schema, **options)
+
+    def write(self, values: Mapping[str, NDArray[Any]]) -> None:
+        """Append rows: an array by column name, one entry per tick and UAV."""
+        arrays = [self._pa.array(values[column.name]) for column in self._columns]
+        self._file.write_table(self._pa.Table.from_arrays(arrays, schema=self._schema))
+
+    def __enter__(self) -> TableWriter:
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        try:
+            self._file.close()
+            if kind is None:
+                if self._as_of is not None:
+                    os.utime(self._unfinished, ns=(self._as_of, self._as_of))
+                self._unfinished.replace(self._path)
+        finally:
+            self._unfinished.unlink(missing_ok=True)

@@ -1,0 +1,12 @@
+from .catalogue import ScenarioError as ScenarioError
+from .catalogue import find as find
+from .catalogue import forms_and_variants as forms_and_variants
+from .catalogue import read as read
+from .catalogue import shipped as shipped
+from .catalogue import summary as summary
+from .columns import LEADING as LEADING
+from .loading import Scenario as Scenario
+from .loading import load as load
+from .loading import load_airframe as load_airframe
+from .mission import Mission as Mission
+from .mission import resolve as resolve

@@ -1,0 +1,110 @@
+"""The moving air of a scenario: what its winds, gusts and turbulence are to each vehicle."""
+
+from __future__ import annotations
+
+import math
+from types import ModuleType
+
+from ftcc.groundside.scenario.checks import Findings
+from ftcc.groundside.schema import Plan, TurbulenceFields
+from ftcc.link.timing import Timing
+from ftcc.sim.plant import Disturbance, Gust
+from ftcc.sim.wind import AIR, NO_TURBULENCE, DiscreteGust, Turbulence
+
+__all__ = ["check_wind", "discrete_gusts", "gust", "low_altitude", "mean_wind", "turbulence", "wind_texts"]
+
+_FOOT = 0.3048
+
+
+def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
+    """Refuse moving air where the plant has none, and gusts of UAVs that are no followers."""
+    channels = [name for name, _ in plant.DISTURBANCES]
+    for table, needed in (("wind", ("wind", "gust")), ("gusts", AIR), ("turbulence", AIR)):
+        if getattr(plan, table) and not {*needed} <= {*channels}:
+            findings.refuse(f"{table}: the plant flies in still air")
+    named = [(f"gusts.{n}.uavs", gust.uavs) for n, gust in enumerate(plan.gusts)]
+    named += [("turbulence.uavs", plan.turbulence.uavs)] if plan.turbulence is not None else []
+    for where, uavs in named:
+        for uav in {*(uavs or ())} - {*plan.uavs.followers}:
+            followers = ", ".join(map(str, plan.uavs.followers))
+            findings.refuse(f"{where}: UAV {uav} is no follower; followers are {followers}")
+
+
+def mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:
+    """The mean wind of (9.33)."""
+    if plan.wind is None or plan.wind.mean == 0.0 or "wind" not in channels:
+        return ()
+    return (Disturbance(0.0, float(channels.index("wind")), plan.wind.mean, 0.0),)
+
+
+def gust(plan: Plan) -> Gust:
+    """The gust of (9.33)."""
+    if plan.wind is None:
+        return Gust()
+    return Gust(plan.wind.gust, round(plan.wind.gust_period * 1e6), plan.seed)
+
+
+def discrete_gusts(plan: Plan, uav: int, V: float, findings: Findings) -> tuple[DiscreteGust, ...]:
+    """The gusts that UAV ``uav`` flies into, which starts with ``V`` (m/s)."""
+    found = []
+    for n, fields in enumerate(plan.gusts):
+        if fields.uavs is not None and uav not in fields.uavs:
+            continue
+        rise = fields.length / (fields.airspeed or V)
+        until = math.inf if fields.until is None else fields.until
+        if not fields.held:
+            until = fields.at + rise
+        if until < fields.at + rise:
+            findings.refuse(
+                f"gusts.{n}.until = {until:g}: it rises until {fields.at + rise:g} s and cannot fall before"
+            )
+        found.append(DiscreteGust(fields.at, rise, fields.along, fields.right, fields.up, until))
+    return tuple(found)
+
+
+def turbulence(plan: Plan, uav: int, V: float, timing: Timing) -> Turbulence:
+    """The turbulence that UAV ``uav`` flies in, which starts with ``V`` (m/s)."""
+    fields = plan.turbulence
+    if fields is None or (fields.uavs is not None and uav not in fields.uavs):
+        return NO_TURBULENCE
+    sigma, length = _sizes(fields)
+    u, v, w = ((fields.airspeed or V) / along for along in length)
+    return Turbulence(sigma, (u, v, w), timing.step_us, plan.seed)
+
+
+def _sizes(fields: TurbulenceFields) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    if fields.sigma is not None and fields.length is not None:
+        return fields.sigma, fields.length
+    assert fields.wind_20ft is not None
+    assert fields.altitude is not None
+    return low_altitude(fields.wind_20ft, fields.altitude)
+
+
+def low_altitude(wind: float, altitude: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Standard deviations (m/s) and lengths (m), along, right, up, below 1000 ft (MIL-F-8785C, 3.7.3.4, figs. 10, 11).
+
+    Parameters
+    ----------
+    wind : float
+        At 20 ft above the ground, m/s.
+    altitude : float
+        Above the ground, m.
+    """
+    h = altitude / _FOOT
+    slope = 0.177 + 0.000823 * h
+    up, level = 0.1 * wind, 0.1 * wind / slope**0.4
+    length = h / slope**1.2 * _FOOT
+    return (level, level, up), (length, length, altitude)
+
+
+def wind_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
+    """Begin and end of each discrete gust as (time, UAV, text)."""
+    texts: list[tuple[float, int | None, str]] = []
+    for fields in plan.gusts:
+        parts = [f"{name} {getattr(fields, name):g} m/s" for name in ("along", "right", "up") if getattr(fields, name)]
+        kind = "gust" if fields.held else "1-cosine gust"
+        for uav in [None] if fields.uavs is None else fields.uavs:
+            texts.append((fields.at, uav, f"{kind} {', '.join(parts)} within {fields.length:g} m"))
+            if fields.until is not None:
+                texts.append((fields.until, uav, f"gust {', '.join(parts)} falls"))
+    return texts

@@ -1,0 +1,338 @@
+"""A whole flight in one process, tick by tick: what the processes do, in the same order, through the same functions.
+
+A template, see `link.compiled`: the free names are ``tick``, the tick of the scheme, and ``cycle``, the flight
+of the plant. `simulate.loop_of` fills them in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.autopilots import build as build_autopilots
+from ftcc.airside.flight_path import Own
+from ftcc.airside.link_events import LinkEvents, link_events, set_links
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS, as_sent, decode_command, encode_command
+from ftcc.link.attitude_target import TARGET, decode_target, encode_target
+from ftcc.link.channel import LINK_REPORT, Inbox, report_link
+from ftcc.link.compiled import compiled, copy, fill
+from ftcc.link.exchange import Exchange, new_exchange, newest_slot
+from ftcc.link.timing import Timing, ticks_a_second
+from ftcc.link.wire import STATE
+from ftcc.sim.obstacles import watch
+from ftcc.sim.plant import DIVERGED, TRUTH, Fleet, X, Z, latch
+from ftcc.sim.spec import VehicleSpec
+from ftcc.sim.spec import build as build_vehicles
+
+__all__ = ["Recording", "World", "fly_ticks", "new_recording", "new_world"]
+
+if "tick" not in globals() or "cycle" not in globals():
+    raise ImportError(
+        "ftcc.groundside.simulation.flight_loop is a template: use ftcc.groundside.simulation.one_process.loop_of"
+    )
+
+tick: Any = globals()["tick"]
+cycle: Any = globals()["cycle"]
+
+_announce = tick.announce
+_anticipate = tick.anticipate
+_control = tick.control
+_hear = tick.hear
+_refer = tick.refer
+_sense = tick.sense
+_tell = tick.tell
+_SWEEPS = tick.SWEEPS
+_actuate = cycle.actuate
+_truth = cycle.truth
+_measure = cycle.measure
+_state_of = cycle.sense
+_advance = cycle.advance
+_conditions = cycle.conditions
+
+_OWN_COMMAND = Own._fields.index("aileron")
+"""Where the command in force begins in `Own`."""
+_V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
+
+_SETTLED = 1e-6
+"""Exchanges of one instant end when no shared value moves by more, in its unit."""
+
+
+class Recording(NamedTuple):
+    """Rows of the recording, time first, then UAV; nan after a UAV was lost."""
+
+    truth: NDArray[np.float64]
+    """(n, k, 13)."""
+    command: NDArray[np.float64]
+    """(n, k, 4): in force."""
+    acting: NDArray[np.float64]
+    """(n, k, 4)."""
+    conditions: NDArray[np.float64]
+    """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
+    signals: NDArray[np.float64]
+    """(n, k, s)."""
+    links: NDArray[np.float64]
+    """(m, k, e, 5): of each in-edge, see ``link.channel.LINK_REPORT``; nan where there is none."""
+    lost: NDArray[np.int64]
+    """(k,): why a UAV was lost, 0 = it was not."""
+    lost_us: NDArray[np.int64]
+    """(k,): when."""
+    first: NDArray[np.int64]
+    """(2,): which row, and which report, of the flight the first of each here is."""
+
+    def begin(self, row: int, report: int) -> None:
+        """Empty it for the rows from ``row`` and the reports from ``report`` on."""
+        for part in (self.truth, self.command, self.acting, self.conditions, self.signals, self.links):
+            part.fill(np.nan)
+        self.first[:] = row, report
+
+
+def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple[int, int]) -> Recording:
+    """An empty recording of ``rows`` ticks and ``reports`` on the links.
+
+    ``widths`` are the numbers of columns of truth, commands, what acts, conditions and signals, ``edges`` the numbers
+    of UAVs and of the in-edges that each has at most.
+    """
+    k = edges[0]
+    truth, command, acting, conditions, signals = (np.full((rows, k, width), np.nan) for width in widths)
+    return Recording(
+        truth=truth,
+        command=command,
+        acting=acting,
+        conditions=conditions,
+        signals=signals,
+        links=np.full((reports, *edges, len(LINK_REPORT)), np.nan),
+        lost=np.zeros(k, np.int64),
+        lost_us=np.zeros(k, np.int64),
+        first=np.zeros(2, np.int64),
+    )
+
+
+class World(NamedTuple):
+    """A whole swarm in one process: all that a flight works on."""
+
+    fleet: Fleet
+    autopilots: Autopilots
+    inbox: Inbox
+    events: LinkEvents
+    exchange: Exchange
+    recording: Recording
+    true: NDArray[np.float64]
+    """(k, 13): the states of this tick."""
+    seen: NDArray[np.float64]
+    """(13,): room for one as measured."""
+    state: NDArray[np.float64]
+    """(13,): room for one as a message carries it."""
+    controls: NDArray[np.float64]
+    """(4,): room for a command as a message carries it."""
+    target: NDArray[np.float64]
+    """(5,): room for an attitude target."""
+
+
+def new_world(
+    vehicles: Sequence[VehicleSpec],
+    specs: Sequence[AutopilotSpec],
+    timing: Timing,
+    conditions: int,
+    room: int | None = None,
+) -> World:
+    """The swarm before the first tick; only the simulator knows ``conditions`` numbers of each vehicle.
+
+    Its recording has room for the rows of so many ticks, by default of all.
+    """
+    autopilots, inbox = build_autopilots(specs, timing)
+    uavs = [spec.uav for spec in specs]
+    senders = [[neighbour.uav for neighbour in spec.neighbours] for spec in specs]
+    signals, values = autopilots.signals.shape[1], autopilots.shared.shape[1]
+    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, signals)
+    last = (timing.ticks + 1 if room is None else room) - 1
+    rows, reports = last // timing.record_every + 1, last // timing.report_every + 1
+    return World(
+        fleet=build_vehicles(vehicles),
+        autopilots=autopilots,
+        inbox=inbox,
+        events=link_events(specs),
+        exchange=new_exchange(uavs, senders, inbox.valid.shape[1], values),
+        recording=new_recording(rows, reports, widths, inbox.valid.shape),
+        true=np.zeros((len(uavs), len(TRUTH))),
+        seen=np.zeros(len(TRUTH)),
+        state=np.zeros(len(STATE)),
+        controls=np.zeros(len(ACTUATORS)),
+        target=np.zeros(len(TARGET)),
+    )
+
+
+@compiled
+def fly_ticks(world, timing, wire, first, last):
+    """Fly the ticks first..last-1.
+
+    With ``wire``, states and commands pass through the messages' float32, records through the mesh's latency, and a
+    command acts one sample after its measurement, as between processes; without, the exchange is ideal.
+    """
+    for n in range(first, last):
+        set_links(world.events, world.inbox, n * timing.period_us)
+        if wire:
+            _tick_by_wire(world, timing, n)
+        else:
+            _ideal_tick(world, timing, n)
+        _record(world, timing, n)
+        _fly_on(world, timing, n)
+
+
+@compiled
+def _tick_by_wire(world, timing, n):
+    """A tick as between processes."""
+    autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            if n > 0:
+                _bring_into_force(world, i)
+            _state_of(world.fleet, i, n, now, timing.seed, world.true[i], world.seen, world.state, world.controls)
+            _sense(autopilots, i, world.state, world.controls, now)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _refer(autopilots, inbox, i, now, timing.period_us)
+            _obey(world, timing, i, now)
+    if now % timing.exchange_us == 0:
+        for i in range(lost.shape[0]):
+            if lost[i] == 0:
+                _tell(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
+
+
+@compiled
+def _ideal_tick(world, timing, n):
+    """A tick with an ideal exchange: all sense, then all share, then all step; a command acts at once."""
+    autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
+    for i in range(lost.shape[0]):
+        if lost[i] > 0:
+            continue
+        fleet, true = world.fleet, world.true[i]
+        _truth(fleet, i, now / 1e6, true)
+        watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[X], true[Z])
+        _measure(fleet, i, n, timing.seed, true, world.seen)
+        own = autopilots.own[i]
+        own[0] = now / 1e6
+        copy(world.seen, own[1:])
+        copy(fleet.command[i], own[_OWN_COMMAND:])
+        if autopilots.leader[i] == 1:
+            # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+        _refer(autopilots, inbox, i, now, timing.period_us)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0:
+            if autopilots.leader[i] == 0:
+                _announce(autopilots, inbox, i)
+            _tell(autopilots, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
+    if _SWEEPS > 1:
+        for i in range(lost.shape[0]):
+            if lost[i] == 0 and autopilots.leader[i] == 0:
+                _hear(world.exchange, inbox, world.events, timing, i, now)
+        _settle(world, now, timing.period_us / 1e6)
+    for i in range(lost.shape[0]):
+        if lost[i] == 0 and autopilots.leader[i] == 0:
+            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _obey(world, timing, i, now)
+    for i in range(lost.shape[0]):
+        if _flies(world.recording, i, now):
+            if autopilots.leader[i] == 1:
+                copy(autopilots.target[i], world.fleet.target[i])
+            else:
+                latch(world.fleet, i, autopilots.command[i])
+            _actuate(world.fleet, i, now / 1e6)
+
+
+@compiled
+def _flies(recording, i, now):
+    """Whether the vehicle of UAV ``i`` flies on from ``now``: it does so, too, where only its law has failed now."""
+    return recording.lost[i] == 0 or (recording.lost[i] == DIVERGED and recording.lost_us[i] == now)
+
+
+@compiled
+def _bring_into_force(world, i):
+    """The last command, as a message carries it."""
+    fleet, autopilots = world.fleet, world.autopilots
+    if autopilots.leader[i] == 1:
+        copy(autopilots.target[i], fleet.target[i])
+        as_sent(fleet.target[i, 1:])
+        return
+    if fleet.code[i, 0] > 0.0:
+        own = autopilots.own[i]
+        V, gamma, chi = own[_V], own[_GAMMA], own[_CHI]
+        encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], world.target)
+        decode_target(world.target, V, gamma, chi, fleet.travel[i], fleet.code[i], world.controls)
+    else:
+        encode_command(autopilots.command[i], autopilots.travel[i], world.controls)
+        decode_command(world.controls, fleet.travel[i], world.controls)
+    latch(fleet, i, world.controls)
+
+
+@compiled
+def _obey(world, timing, i, now):
+    """The law of a follower; where its command is not finite the UAV is lost."""
+    if world.autopilots.leader[i] == 1:
+        return
+    if not _control(world.autopilots, world.inbox, i, timing.period_us / 1e6):
+        world.recording.lost[i] = DIVERGED
+        world.recording.lost_us[i] = now
+        fill(world.autopilots.signals[i], np.nan)
+
+
+@compiled
+def _settle(world, now, dt):
+    """Repeat the ideal exchange of this instant until the shared values have settled, all at once each time.
+
+    For a law whose shared values depend on what it hears of the same instant: an algebraic loop around the graph.
+    """
+    exchange, autopilots, inbox, lost = world.exchange, world.autopilots, world.inbox, world.recording.lost
+    for _ in range(_SWEEPS - 1):
+        moved = 0.0
+        for i in range(lost.shape[0]):
+            if lost[i] == 0 and autopilots.leader[i] == 0:
+                _anticipate(autopilots, inbox, i, dt)
+                last = exchange.values[i, newest_slot(exchange, i)]
+                for m in range(last.shape[0]):
+                    moved = max(moved, abs(autopilots.shared[i, m] - last[m]))
+                copy(autopilots.shared[i], last)
+        for i in range(lost.shape[0]):
+            for edge in range(inbox.degree[i]):
+                if inbox.stamp[i, edge] == now:
+                    row = exchange.sender[i, edge]
+                    copy(exchange.values[row, newest_slot(exchange, row)], inbox.values[i, edge])
+        if moved <= _SETTLED:
+            break
+
+
+@compiled
+def _record(world, timing, n):
+    """A row of each UAV that flies, and one on each of its in-edges, where they are due."""
+    recording, fleet, now = world.recording, world.fleet, n * timing.period_us
+    every, report_every = timing.record_every, ticks_a_second(timing.period_us)
+    for i in range(recording.lost.shape[0]):
+        if n % every == 0 and _flies(recording, i, now):
+            row = n // every - recording.first[0]
+            copy(world.true[i], recording.truth[row, i])
+            copy(fleet.command[i], recording.command[row, i])
+            copy(fleet.acting[i], recording.acting[row, i])
+            _conditions(fleet, i, now / 1e6, recording.conditions[row, i])
+            copy(world.autopilots.signals[i], recording.signals[row, i])
+        if n % report_every == 0 and recording.lost[i] == 0:
+            for edge in range(world.inbox.degree[i]):
+                report = n // report_every - recording.first[1]
+                report_link(world.inbox, i, edge, recording.links[report, i, edge])
+
+
+@compiled
+def _fly_on(world, timing, n):
+    """Fly the vehicles for one period; one that leaves its model is lost."""
+    now, recording = n * timing.period_us, world.recording
+    for i in range(recording.lost.shape[0]):
+        if _flies(recording, i, now):
+            why = _advance(world.fleet, i, now, timing.period_us, timing.step_us)
+            if why > 0 and recording.lost[i] == 0:
+                recording.lost[i] = why
+                recording.lost_us[i] = now + timing.period_us

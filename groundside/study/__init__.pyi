@@ -1,0 +1,10 @@
+from .figure import draw as draw
+from .flights import Outcome as Outcome
+from .flights import fly_all as fly_all
+from .plan import Study as Study
+from .plan import StudyError as StudyError
+from .plan import Trial as Trial
+from .plan import plan_study as plan_study
+from .results import summary as summary
+from .results import table as table
+from .results import write as write

@@ -1,0 +1,17 @@
+from .conversation import NoAnswerError as NoAnswerError
+from .conversation import RefusedError as RefusedError
+from .conversation import StationError as StationError
+from .doctor import examine as examine
+from .flight import Clock as Clock
+from .flight import FlightOptions as FlightOptions
+from .flight import Viewer as Viewer
+from .flight import fly_swarm as fly_swarm
+from .launcher import automatic_pack as automatic_pack
+from .launcher import no_main_module as no_main_module
+from .open_files import provide_files as provide_files
+from .registry import Entry as Entry
+from .registry import ask_swarm as ask_swarm
+from .registry import check_name as check_name
+from .registry import find_swarm as find_swarm
+from .registry import running_swarms as running_swarms
+from .station import Station as Station

@@ -1,0 +1,258 @@
+"""Whether this machine can fly a scenario, and how fast: measured by flying it for some seconds, not by a rule.
+
+The very scenario takes off in lockstep, as fast as it can, with all its processes, its mesh and its recording, but
+without a viewer and without anybody listening on MAVLink; what it reaches within some seconds is what a whole flight
+reaches. Where it falls short of the speed asked for, the limit and what would help are those of `pace`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import psutil  # type: ignore[import-untyped]
+
+from ftcc.groundside.dashboard import Event, Pace
+from ftcc.groundside.swarm.pace import Kind, PaceMeter, Sample, Setup, judge, processes_of, usable_cores
+from ftcc.link.ports import PortError, reserve
+
+if TYPE_CHECKING:
+    from ftcc.groundside.scenario import Mission
+
+__all__ = ["Finding", "Prediction", "examine", "machine", "predict", "verdict"]
+
+_MEASURED = 3.5
+"""Wall time over which a flight is measured, s."""
+_SETTLED = 0.7
+"""Wall time after which everybody has found its pace, s."""
+_LEAST_MEASURED = 1.0
+"""Wall time that is enough where a scenario is over sooner, s."""
+_LONGEST = 36_000.0
+"""Simulated time to which a short scenario is extended, so that it lasts until it is stopped, s."""
+_BETWEEN = 0.25
+"""Wall time between two samples, s."""
+_RESERVE = 1.15
+"""A speed that is exceeded by less than this factor is held only while nothing else happens on the machine."""
+_NOBODY = (("127.0.0.1", 9), ("127.0.0.1", 9))
+"""As many listeners as a flight has; nobody listens on this port (discard)."""
+
+
+class Finding(NamedTuple):
+    """A row of what the doctor says."""
+
+    what: str
+    found: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How a flight would go on this machine."""
+
+    pack: int
+    processes: int
+    """Of vehicles and autopilots."""
+    pace: Pace
+    """As fast as possible; the factor is nan if the flight was too short to tell."""
+    memory: float
+    """Of all processes together, what they share counted once, bytes."""
+    start: float
+    """Wall time until everybody was ready, s."""
+    problem: str = ""
+    """Why it did not fly."""
+
+
+def examine(
+    mission: Mission,
+    speed: float = 1.0,
+    seconds: float = _MEASURED,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[Finding]:
+    """What this machine has, and how fast it flies ``mission``: once as ``--pack auto``, once unpacked.
+
+    Parameters
+    ----------
+    speed : times real time that are wanted; inf: whatever can be had.
+    seconds : wall time over which either is measured, after its start.
+    progress : called with what is done at the moment, which may take a minute.
+    """
+    from ftcc.groundside.swarm.launcher import automatic_pack
+
+    findings = machine(mission)
+    if not mission.wire:
+        return [*findings, Finding(mission.name, "an ideal exchange", "flies in one process only: ftcc simulate")]
+    uavs = len(mission.vehicles)
+    for pack in sorted({automatic_pack(uavs), 1}, reverse=True):
+        how = f"--pack auto ({pack})" if pack > 1 else "unpacked"
+        progress(f"flying {mission.name} {how} for {seconds:g} s")
+        findings.append(verdict(f"{mission.name}, {how}", predict(mission, pack, seconds), speed))
+    return findings
+
+
+def machine(mission: Mission) -> list[Finding]:
+    """What there is: interpreter, cores, ports, compiled code, and what only some tests need."""
+    from ftcc.link.compiled import cache_folder
+
+    cores = usable_cores()
+    memory = psutil.virtual_memory()
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    drivers = Path("/usr/share/vulkan/icd.d")
+    vulkan = sorted(path.stem for path in drivers.glob("*.json")) if drivers.is_dir() else []
+    functions = len(list(cache_folder.rglob("*.nbi")))
+    return [
+        Finding("Python", sys.version.split()[0], "ok"),
+        Finding("cores", str(cores), "ok" if cores >= 2 else "few"),
+        Finding("memory", f"{memory.available / 1e9:.1f} of {memory.total / 1e9:.1f} GB free", "ok"),
+        _ports(mission),
+        Finding(
+            "compiled code", str(cache_folder), f"{functions} functions" if functions else "compiled at first start"
+        ),
+        Finding(
+            "Chromium (browser tests)",
+            chromium or "not found",
+            "ok" if chromium and shutil.which("chromedriver") else "optional",
+        ),
+        Finding(
+            "Mesa Vulkan (pictures without a screen)",
+            ", ".join(vulkan[:3]) or "not found",
+            "ok" if vulkan else "optional: mesa-vulkan-drivers",
+        ),
+    ]
+
+
+def _ports(mission: Mission) -> Finding:
+    try:
+        block = reserve([spec.uav for spec in mission.vehicles])
+    except PortError as error:
+        return Finding("ports", str(error), "missing")
+    block.release()
+    return Finding("ports", f"{block.base}-{block.base + block.size - 1}", "free")
+
+
+def verdict(what: str, flown: Prediction, speed: float) -> Finding:
+    """What a prediction means for who wants ``speed``."""
+    if flown.problem:
+        return Finding(what, "does not fly", flown.problem)
+    if math.isnan(flown.pace.factor):
+        return Finding(what, "too short to tell", "give it a longer duration")
+    found = (
+        f"{flown.pace.factor:.1f} times real time, {flown.processes} processes, {flown.memory / 1e9:.1f} GB, "
+        f"ready after {flown.start:.0f} s"
+    )
+    why = f"{flown.pace.limit}; {flown.pace.advice}" if flown.pace.advice else flown.pace.limit
+    if math.isinf(speed):
+        return Finding(what, found, why)
+    if flown.pace.factor >= _RESERVE * speed:
+        return Finding(what, found, f"ok: holds --speed {speed:g}")
+    if flown.pace.factor >= speed:
+        return Finding(what, found, f"tight at --speed {speed:g}: {why}")
+    return Finding(what, found, f"too slow for --speed {speed:g}: {why}")
+
+
+@dataclass
+class _Watch:
+    """Watches a flight from within: samples it, and has it stopped when it has been seen for long enough."""
+
+    folder: Path
+    meter: PaceMeter
+    seconds: float
+    duration: float
+    """Of the scenario, simulated s."""
+    created: float = field(default_factory=time.monotonic)
+    begun: float = math.inf
+    """When everybody was ready (wall s, monotonic)."""
+    processes: list[tuple[str, int, Kind]] = field(default_factory=list)
+    memory: float = 0.0
+    samples: list[Sample] = field(default_factory=list)
+    enough: bool = False
+    problems: list[str] = field(default_factory=list)
+
+    def started(self, _address: str | None) -> None:
+        """Everybody is ready."""
+        self.begun = time.monotonic()
+
+    def hear(self, event: Event) -> None:
+        """Something happened."""
+        if event.severity == "error" and event.t <= self.duration:
+            self.problems.append(event.text.splitlines()[0])
+
+    def progress(self, t: float, _pace: Pace) -> None:
+        """The flight has come to ``t``."""
+        now = time.monotonic()
+        if self.enough or now - self.begun < _SETTLED:
+            return
+        if not self.processes:
+            self.processes = processes_of(self.folder, os.getpid())
+            self.memory = _memory()
+            return  # that took its time: ``t`` is old
+        if not self.samples or now - self.samples[-1].wall >= _BETWEEN:
+            self.samples.append(self.meter.sample(now, t, self.processes, [], os.getpid()))
+        if now - self.samples[0].wall >= (self.seconds if t <= self.duration else _LEAST_MEASURED):
+            self.enough = True
+            # From a thread of its own: the one that flies has to answer.
+            threading.Thread(target=_stop, args=(self.folder.name,), daemon=True).start()
+
+
+def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Prediction:
+    """Fly ``mission``, look at it for some ``seconds`` of wall time, and tell how a whole flight would go.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the flight was stopped by somebody else.
+    """
+    from ftcc.groundside.swarm.flight import FlightOptions, fly_swarm
+    from ftcc.groundside.swarm.launcher import automatic_pack
+
+    uavs = [spec.uav for spec in mission.vehicles]
+    setup = Setup(None, len(uavs), pack, automatic_pack(len(uavs)), usable_cores())
+    with tempfile.TemporaryDirectory(prefix="ftcc-doctor-") as room:
+        folder = Path(room)
+        watch = _Watch(folder, PaceMeter(setup), seconds, mission.timing.duration)
+        ticks = round(_LONGEST / mission.timing.period)
+        lasting = replace(mission, timing=mission.timing._replace(ticks=max(ticks, mission.timing.ticks)))
+        options = FlightOptions(folder, lockstep=True, speed=math.inf, pack=pack, listeners=_NOBODY)
+        processes = 2 * -(-len(uavs) // pack)
+        try:
+            outcome = fly_swarm(lasting, options, reserve(uavs), watch.hear, watch.progress, watch.started)
+        except (TimeoutError, PortError) as error:
+            return Prediction(pack, processes, Pace(math.nan, None), 0.0, math.nan, str(error))
+    if outcome.stopped and not watch.enough:
+        raise KeyboardInterrupt
+    pace = Pace(math.nan, None)
+    if len(watch.samples) > 1:
+        pace = judge(watch.samples[0], watch.samples[-1], setup)
+    problem = "; ".join(watch.problems)
+    return Prediction(pack, processes, pace, watch.memory, watch.begun - watch.created, problem)
+
+
+def _stop(name: str) -> None:
+    """End a running swarm in order."""
+    from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
+
+    try:
+        ask_swarm(find_swarm(name), "stop")
+    except (LookupError, OSError) as error:
+        # It has come to its end by itself in this very moment.
+        print(f"ftcc doctor: {error}", file=sys.stderr)
+
+
+def _memory() -> float:
+    """What this process and all that it has started take, shared memory counted once, bytes."""
+    total = 0.0
+    for process in (psutil.Process(), *psutil.Process().children(recursive=True)):
+        try:
+            info = process.memory_full_info()
+        except psutil.NoSuchProcess:
+            continue
+        total += getattr(info, "pss", info.uss)
+    return total

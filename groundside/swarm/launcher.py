@@ -1,0 +1,322 @@
+"""The launcher: starts a swarm's processes, lets them go together, watches over them, and ends them.
+
+It knows processes, ports and pipes, not physics. Children are forked from a fork server that holds everything compiled;
+each has a log, and its last words are reported if it dies.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import selectors
+import sys
+import time
+import types
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ftcc.groundside.dashboard import Event
+from ftcc.groundside.swarm.flow import Flow
+from ftcc.link.gate import Ended, Go, Gone, Held, Lost, Ready, Release, Said, Stop
+from ftcc.link.ports import PortBlock
+from ftcc.link.process import Setting, process_main
+from ftcc.link.recording import AIRCRAFT_LOST
+
+if TYPE_CHECKING:
+    from ftcc.groundside.scenario import Mission
+    from ftcc.groundside.verdict import Verdict
+
+__all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
+
+_END = 1.2
+"""Wall time that processes have to end by themselves, s."""
+_ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
+"""Exit codes after a stop that are nobody's death: also SIGTERM to the whole group, and a fork server gone first."""
+_LAST_WORDS = 12
+"""Lines of a dead process's log that are reported."""
+_SCHEME_VARIABLE, _PLANT_VARIABLE = "FTCC_PRELOAD_SCHEME", "FTCC_PRELOAD_PLANT"
+"""Tell the fork server what to load, see `preload`."""
+
+
+def automatic_pack(uavs: int) -> int:
+    """Vehicles per process that keep every core busy and wake as few processes as possible."""
+    pairs = max(1, (os.cpu_count() or 2) // 2)
+    return max(1, -(-uavs // pairs))
+
+
+Role = Literal["vehicle", "autopilot"]
+"""What a process flies."""
+
+
+@dataclass
+class Child:
+    """A process of the swarm."""
+
+    name: str
+    uavs: tuple[int, ...]
+    kind: Role
+    process: BaseProcess
+    pipe: Connection
+    ready: bool = False
+    ended: Ended | None = None
+    dead: bool = False
+
+    def tell(self, message: Any) -> None:
+        """Say something; a child that is gone will be noticed by its sentinel."""
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError, OSError):
+            self.pipe.send(message)
+
+
+@dataclass
+class Outcome:
+    """How a flight went."""
+
+    died: list[str] = field(default_factory=list)
+    """Names of processes that died."""
+    lost: dict[int, str] = field(default_factory=dict)
+    """UAVs whose aircraft was lost, with the reason."""
+    late: int = 0
+    ticks: int = 0
+    """Ticks flown by all vehicles together."""
+    flown: int = 0
+    """The last tick of the one that flew longest."""
+    stopped: bool = False
+    """Ended before its time, on request."""
+    verdict: Verdict | None = None
+    """None where nothing was recorded."""
+
+    @property
+    def ok(self) -> bool:
+        """No process died and no aircraft was lost."""
+        return not self.died and not self.lost
+
+
+@contextlib.contextmanager
+def no_main_module() -> Iterator[None]:
+    """Keep children from importing the program that started us."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = types.ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
+
+
+class Swarm:
+    """The processes of one run.
+
+    Parameters
+    ----------
+    mission : the resolved scenario.
+    folder : the run's folder.
+    ports : a reserved block.
+    lockstep : wait for each other, and for the clock; otherwise for the clock alone.
+    speed : simulated seconds per second, at most; inf: as fast as possible, in lockstep.
+    pack : vehicles per process.
+    held : stay at the first tick until `resume`.
+    listeners : where other ground stations may listen.
+    key : key file for signed links to the ground.
+    id_offset : what UAVs' ids have added as MAVLink systems towards the ground.
+    started : Unix time that counts as simulated time 0, s; default: now.
+    on_event : called with everything worth showing.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        folder: Path,
+        ports: PortBlock,
+        *,
+        lockstep: bool,
+        speed: float = 1.0,
+        pack: int = 1,
+        held: bool = False,
+        listeners: tuple[tuple[str, int], ...] = (),
+        key: Path | None = None,
+        id_offset: int = 0,
+        started: float | None = None,
+        on_event: Callable[[Event], None],
+    ) -> None:
+        self.mission = mission
+        self.folder = folder
+        self.lockstep = lockstep
+        self.on_event = on_event
+        self.outcome = Outcome()
+        self.children: list[Child] = []
+        self._selector = selectors.DefaultSelector()
+        self.stopping_since: float | None = None
+        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying_vehicles)
+        uavs = [spec.uav for spec in mission.vehicles]
+        groups = [tuple(uavs[start : start + pack]) for start in range(0, len(uavs), pack)]
+        self.setting = Setting(
+            swarm=f"{folder.name}-{os.getpid()}",
+            timing=mission.timing,
+            lockstep=lockstep,
+            ports={uav: ports.of(uav) for uav in uavs},
+            peer_of={uav: group[0] for group in groups for uav in group},
+            station=ports.station,
+            folder=folder,
+            listeners=listeners,
+            key=key,
+            home=mission.home,
+            id_offset=id_offset,
+            epoch_us=round((time.time() if started is None else started) * 1e6),
+        )
+        self.groups = groups
+
+    def start(self) -> None:
+        """Start all processes."""
+        # Imported by name only when a child needs them: the launcher itself flies nothing.
+        from ftcc.airside.process import run as run_autopilots
+        from ftcc.sim.process import run as run_vehicles
+
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        os.environ[_SCHEME_VARIABLE] = self.mission.scheme.name
+        os.environ[_PLANT_VARIABLE] = self.mission.plant
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(["ftcc.groundside.swarm.preload"])
+        vehicles = {spec.uav: spec for spec in self.mission.vehicles}
+        autopilots = {spec.uav: spec for spec in self.mission.autopilots}
+        with no_main_module():
+            for group in self.groups:
+                self._spawn(context, "vehicle", group, run_vehicles, [vehicles[uav] for uav in group])
+                self._spawn(context, "autopilot", group, run_autopilots, [autopilots[uav] for uav in group])
+
+    def _spawn(
+        self,
+        context: Any,
+        kind: Literal["vehicle", "autopilot"],
+        group: tuple[int, ...],
+        run: Callable[..., None],
+        specs: Sequence[Any],
+    ) -> None:
+        span = f"{group[0]}" if len(group) == 1 else f"{group[0]}-{group[-1]}"
+        name = f"uav{span}-{kind}"
+        ours, theirs = context.Pipe()
+        # A daemon: Ctrl-C while processes start, or whatever ends the launcher before it has told them to stop, ends
+        # them. Otherwise it would wait for them at its exit, and they for it, for ever.
+        process = context.Process(
+            target=process_main, args=(name, theirs, self.setting, run, specs), name=name, daemon=True
+        )
+        process.start()
+        theirs.close()
+        child = Child(name, group, kind, process, ours)
+        self.children.append(child)
+        for source in (ours, process.sentinel):
+            self._selector.register(source, selectors.EVENT_READ, child)
+
+    @property
+    def ready(self) -> bool:
+        """Whether every living process waits for the go."""
+        return all(child.ready or child.dead for child in self.children)
+
+    @property
+    def over(self) -> bool:
+        """Whether every process has flown its ticks or died."""
+        return all(child.ended or child.dead for child in self.children)
+
+    def go(self) -> None:
+        """Begin the flight: one epoch for all."""
+        self.tell_all(Go(*self.flow.begin()))
+
+    @property
+    def flying(self) -> list[Child]:
+        """The processes that still fly."""
+        return [child for child in self.children if not (child.ended or child.dead)]
+
+    def _flying_vehicles(self) -> list[str]:
+        """Names of the vehicle processes that still fly."""
+        return [child.name for child in self.flying if child.kind == "vehicle"]
+
+    def tell_all(self, message: Any) -> None:
+        """Say something to every process."""
+        for child in self.children:
+            child.tell(message)
+
+    def stop(self) -> None:
+        """End the flight now, in order."""
+        if self.stopping_since is None:
+            self.stopping_since = time.monotonic()
+            self.outcome.stopped = not self.over
+            self.tell_all(Stop())
+
+    def fileno(self) -> int:
+        """A descriptor that can be read where a process has said something, or has died."""
+        return self._selector.fileno()
+
+    def attend(self) -> None:
+        """Take in what the processes said, and notice who died."""
+        for child in {key.data.name: key.data for key, _ in self._selector.select(0.0)}.values():
+            with contextlib.suppress(EOFError, ConnectionResetError):
+                while child.pipe.poll():
+                    self._take(child, child.pipe.recv())
+            if not child.process.is_alive():
+                self._bury(child)
+        if self.stopping_since is not None and time.monotonic() - self.stopping_since > _END:
+            for child in self.children:
+                if not (child.ended or child.dead):
+                    child.process.kill()
+
+    def _take(self, child: Child, message: Any) -> None:
+        match message:
+            case Ready():
+                child.ready = True
+            case Ended(tick, late, ticks):
+                child.ended = message
+                self.outcome.flown = max(self.outcome.flown, min(tick, self.mission.timing.ticks))
+                if child.kind == "vehicle":
+                    self.outcome.late += late
+                    self.outcome.ticks += ticks
+            case Held(tick):
+                self.flow.held(child.name, tick)
+            case Lost(uav, at_us, reason):
+                self.outcome.lost[uav] = reason
+                self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
+            case Said(severity, text, uav, at_us, who, outcome):
+                self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
+
+    def _bury(self, child: Child) -> None:
+        """A process is gone: say so, end its partner, and let nobody wait for it."""
+        child.dead = True
+        for source in (child.pipe, child.process.sentinel):
+            self._selector.unregister(source)
+        child.process.join()
+        if child.ended:
+            return
+        if self.stopping_since is None or child.process.exitcode not in _ENDED_ON_REQUEST:
+            self.outcome.died.append(child.name)
+            code = child.process.exitcode
+            how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+            words = self.last_words(child.name)
+            self.on_event(Event(-1.0, "error", f"process {child.name} died ({how})" + (f": {words}" if words else "")))
+        for other in self.children:
+            if other.uavs == child.uavs:
+                other.tell(Stop())
+            elif other.kind == "autopilot":
+                for uav in child.uavs:
+                    other.tell(Gone(uav))
+
+    def last_words(self, name: str) -> str:
+        """The end of a process's log."""
+        path = self.folder / "logs" / f"{name}.log"
+        lines = path.read_text(errors="replace").strip().splitlines() if path.exists() else []
+        return "\n".join(lines[-_LAST_WORDS:])
+
+    def release(self) -> None:
+        """Everybody has ended: let them close and wait until they are gone."""
+        self._selector.close()
+        for child in self.children:
+            child.tell(Release())
+        until = time.monotonic() + _END
+        for child in self.children:
+            child.process.join(max(0.0, until - time.monotonic()))
+            if child.process.is_alive():
+                child.process.kill()
+                child.process.join()
+            child.pipe.close()

@@ -1,0 +1,287 @@
+"""How fast a swarm flies on the wall clock, what limits it, and what would help.
+
+`PaceMeter` reads, about once a second, how much processor time each process of the swarm and the whole machine have
+used; `judge` compares two such samples. What it tells apart: the machine is full, with the swarm's own processes or
+with other programs; one process, or a vehicle and an autopilot process in turn, fill one core while others idle; nobody
+is busy, and time goes by between a message and the wake-up of who waits for it.
+"""
+
+from __future__ import annotations
+
+import collections
+import math
+import os
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
+
+import psutil  # type: ignore[import-untyped]
+
+from ftcc.groundside.dashboard import Pace
+
+__all__ = ["Kind", "Member", "PaceMeter", "Sample", "Setup", "judge", "loads", "processes_of", "usable_cores"]
+
+Kind = Literal["vehicle", "autopilot", "ground station", "viewer"]
+"""What a process of a swarm is."""
+
+_WINDOW = 5.0
+"""Wall time over which a factor is measured, s."""
+_SHORTEST = 0.5
+"""Below it there is no factor yet, s."""
+_HELD = 0.97
+"""Share of the factor asked for from which on it counts as held."""
+_OLD = 0.1
+"""By how much older the simulated time of one sample may be than that of another: it comes with telemetry, wall s."""
+_FULL = 0.9
+"""Share of all cores from which on the machine is full."""
+_FOREIGN = 0.2
+"""Share of all cores from which on other programs are to blame for that."""
+_SATURATED = 0.85
+"""Share of one core from which on a process has no time left."""
+_IN_TURN = 1.1
+"""Cores that a vehicle and an autopilot process use together at most, if only one of them works at a time."""
+_ROOM = 0.9
+"""Idle cores from which on more processes would find one."""
+_NOTICEABLE = 0.05
+"""Share of all cores from which on leaving something out helps."""
+
+_CGROUP_LIMIT = Path("/sys/fs/cgroup/cpu.max")
+_PLURAL: dict[Kind, str] = {"vehicle": "vehicles", "autopilot": "autopilots"}
+
+
+class Member(NamedTuple):
+    """A process of the swarm."""
+
+    name: str
+    kind: Kind
+
+    @property
+    def group(self) -> str:
+        """What a vehicle process and its autopilot process have in common: the UAVs, as ``uav1-8``."""
+        return self.name.removesuffix(f"-{self.kind}")
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Who has used how much processor time until one instant."""
+
+    wall: float
+    """Monotonic, s."""
+    t: float
+    """Simulated, s."""
+    used: Mapping[Member, float]
+    """By each process since it began, s."""
+    busy: float
+    """By everybody on all usable cores since the machine started, s."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How the swarm is flown, as far as it could be flown otherwise."""
+
+    asked: float | None
+    """Times real time; None = as fast as possible."""
+    uavs: int
+    pack: int
+    """Vehicles per process."""
+    automatic: int
+    """What ``--pack auto`` would be."""
+    cores: int
+    """That the swarm may use."""
+
+
+def usable_cores() -> int:
+    """Cores that this process may use: those that it is bound to, or fewer in a container with a limit."""
+    bound = len(_bound_to())
+    if not _CGROUP_LIMIT.exists():
+        return bound
+    quota, period = _CGROUP_LIMIT.read_text().split()
+    return bound if quota == "max" else max(1, min(bound, round(int(quota) / int(period))))
+
+
+def _bound_to() -> Collection[int]:
+    if hasattr(os, "sched_getaffinity"):
+        return os.sched_getaffinity(0)
+    return range(os.cpu_count() or 1)
+
+
+def processes_of(folder: Path, launcher: int) -> list[tuple[str, int, Kind]]:
+    """Name, pid and kind of the vehicle and autopilot processes of the run in ``folder``, by the logs they write.
+
+    For whoever has not started them, but knows the pid of their ``launcher``.
+    """
+    logs = {str(path): path.stem for path in (folder.resolve() / "logs").glob("*.log")}
+    found: list[tuple[str, int, Kind]] = []
+    for process in psutil.Process(launcher).children(recursive=True):
+        try:
+            names = [logs[file.path] for file in process.open_files() if file.path in logs]
+        except psutil.NoSuchProcess:
+            continue
+        for name in names[:1]:
+            found.append((name, process.pid, "vehicle" if name.endswith("-vehicle") else "autopilot"))
+    return found
+
+
+def loads(earlier: Sample, later: Sample) -> dict[Member, float]:
+    """Cores that each process kept busy between two samples, of those that are in both."""
+    wall = later.wall - earlier.wall
+    return {one: (used - earlier.used[one]) / wall for one, used in later.used.items() if one in earlier.used}
+
+
+def judge(earlier: Sample, later: Sample, setup: Setup) -> Pace:
+    """The pace between two samples, and what limited it."""
+    wall = later.wall - earlier.wall
+    factor = (later.t - earlier.t) / wall
+    if setup.asked is not None and factor * wall >= _HELD * setup.asked * (wall - _OLD):
+        return Pace(factor, setup.asked)
+    of = loads(earlier, later)
+    by_kind = {kind: sum(load for one, load in of.items() if one.kind == kind) for kind in get_args(Kind)}
+    everybody = (later.busy - earlier.busy) / wall
+    foreign = max(0.0, everybody - sum(by_kind.values()))
+    if everybody >= _FULL * setup.cores:
+        limit, advice = _full(by_kind, foreign, setup)
+    else:
+        limit, advice = _alone(of, everybody, setup) or _waiting(by_kind, everybody, setup)
+    if setup.asked is not None:
+        advice = [*advice, f"--speed {_rounded(0.9 * factor)}"]
+    return Pace(factor, setup.asked, limit, " or ".join(advice))
+
+
+def _full(by_kind: Mapping[Kind, float], foreign: float, setup: Setup) -> tuple[str, list[str]]:
+    """All cores are busy."""
+    full = f"all {setup.cores} cores are busy" if setup.cores > 1 else "the only core is busy"
+    if foreign >= _FOREIGN * setup.cores:
+        advice = ["fewer other programs (a browser that shows the dashboard is one of them)"]
+        return f"{full}, other programs take {foreign:.1f}", [*advice, *_less_work(by_kind, setup)]
+    most, *others = sorted(by_kind, key=lambda kind: -by_kind[kind])
+    rest = ", ".join(f"{_PLURAL.get(kind, kind)} {by_kind[kind]:.1f}" for kind in others if by_kind[kind] >= 0.05)
+    limit = f"{full}, most with {_PLURAL.get(most, f'the {most}')}: {by_kind[most]:.1f}" + (f"; {rest}" if rest else "")
+    return limit, _less_work(by_kind, setup) or ["fewer UAVs, or more cores"]
+
+
+def _less_work(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
+    """What makes the same flight cheaper."""
+    advice = []
+    if setup.pack < setup.automatic:
+        advice.append("--pack auto")
+    if by_kind["viewer"] >= _NOTICEABLE * setup.cores:
+        advice.append("--viewer none")
+    return advice
+
+
+def _alone(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[str, list[str]] | None:
+    """One process, or the two of one group in turn, fill a core while others idle; None if nobody does."""
+    flying = {one: load for one, load in of.items() if one.kind in ("vehicle", "autopilot")}
+    if not flying:
+        return None
+    idle = setup.cores - everybody
+    idling = f"while {idle:.1f} of {setup.cores} cores idle"
+    busiest = max(flying, key=lambda one: flying[one])
+    groups: dict[str, float] = {}
+    for one, load in flying.items():
+        groups[one.group] = groups.get(one.group, 0.0) + load
+    fullest = max(groups, key=lambda group: groups[group])
+    if flying[busiest] >= _SATURATED:
+        limit = f"{busiest.name} alone fills a core ({flying[busiest]:.0%}) {idling}"
+    elif setup.pack > 1 and _SATURATED <= groups[fullest] <= _IN_TURN:
+        limit = f"vehicles and autopilots of {fullest} take turns on one core ({groups[fullest]:.0%}) {idling}"
+    else:
+        return None
+    if setup.pack == 1:
+        return limit, ["a faster core: one UAV cannot be spread over several"]
+    if idle < _ROOM:
+        return limit, []
+    return limit, [f"--pack {setup.pack // 2}: smaller packs use more cores"]
+
+
+def _waiting(by_kind: Mapping[Kind, float], everybody: float, setup: Setup) -> tuple[str, list[str]]:
+    """Cores idle and nobody is short of one."""
+    own = sum(by_kind.values())
+    limit = f"processes wait for each other's messages: the swarm uses {own:.1f} of {setup.cores} cores"
+    return limit, ["--pack auto: fewer processes wait for each other"] if setup.pack < setup.automatic else []
+
+
+def _rounded(factor: float) -> str:
+    """Two significant digits, downwards."""
+    if factor <= 0.0:
+        return "lower"
+    unit = 10.0 ** (math.floor(math.log10(factor)) - 1)
+    return f"{math.floor(factor / unit + 1e-9) * unit:.6g}"
+
+
+class PaceMeter:
+    """Measures the pace of a flying swarm; to be asked about once a second.
+
+    Parameters
+    ----------
+    setup : how the swarm is flown; to be replaced when another speed is asked for, with `restart`.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self._samples: collections.deque[Sample] = collections.deque()
+        self._known: dict[int, psutil.Process] = {}
+        self._cores = frozenset(_bound_to())
+
+    def restart(self) -> None:
+        """Forget what was measured: after a pause, a step, or a change of speed."""
+        self._samples.clear()
+
+    def measure(
+        self, wall: float, t: float, processes: Iterable[tuple[str, int, Kind]], viewers: Iterable[int], own: int
+    ) -> Pace:
+        """The pace over the last 5 s of wall time; its factor is nan until half a second has been seen.
+
+        Slower than real time it takes two simulated seconds: the telemetry tells of time in steps of 0.1 s.
+
+        Parameters
+        ----------
+        wall, t : the present instant, monotonic and simulated, s.
+        processes : name, pid and kind of each living process of vehicles and autopilots.
+        viewers : pids of the dashboard's viewer, if this flight has started one.
+        own : pid of the ground station.
+        """
+        asked = self.setup.asked
+        slow = 2.0 / asked if asked is not None and asked < 1.0 else 0.0
+        self._samples.append(self.sample(wall, t, processes, viewers, own))
+        while len(self._samples) > 2 and self._samples[1].wall <= wall - max(_WINDOW, slow):
+            self._samples.popleft()
+        earliest, latest = self._samples[0], self._samples[-1]
+        if latest.wall - earliest.wall < max(_SHORTEST, slow):
+            return Pace(math.nan, self.setup.asked)
+        return judge(earliest, latest, self.setup)
+
+    def sample(
+        self, wall: float, t: float, processes: Iterable[tuple[str, int, Kind]], viewers: Iterable[int], own: int
+    ) -> Sample:
+        """What everybody has used until now; arguments as for `measure`."""
+        everybody: list[tuple[str, int, Kind]] = [*processes, ("ground station", own, "ground station")]
+        everybody += [(f"viewer {pid}", pid, "viewer") for pid in viewers]
+        used = {}
+        for name, pid, kind in everybody:
+            seconds = self._used(pid)
+            if seconds is not None:
+                used[Member(name, kind)] = seconds
+        return Sample(wall, t, used, self._busy())
+
+    def _used(self, pid: int) -> float | None:
+        """Processor time of a process, s; None if it is gone."""
+        try:
+            if pid not in self._known:
+                self._known[pid] = psutil.Process(pid)
+            times = self._known[pid].cpu_times()
+        except psutil.NoSuchProcess:
+            return None
+        return float(times.user + times.system)
+
+    def _busy(self) -> float:
+        """Processor time of the whole machine on the cores that the swarm may use, s."""
+        total = 0.0
+        for core, times in enumerate(psutil.cpu_times(percpu=True)):
+            if core in self._cores:
+                # Linux counts guests as users too; waiting for a disk is idling.
+                idle = times.idle + getattr(times, "iowait", 0.0)
+                guests = getattr(times, "guest", 0.0) + getattr(times, "guest_nice", 0.0)
+                total += sum(times) - idle - guests
+        return total

@@ -1,0 +1,188 @@
+"""The list of running swarms of this user, and the socket by which each can be told what to do."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ftcc.groundside.errors import UserError
+from ftcc.link.ports import runtime_folder
+
+__all__ = ["Card", "Control", "Entry", "ask_swarm", "check_name", "find_swarm", "running_swarms"]
+
+
+_LONGEST_PATH = 107
+"""Of a socket, bytes."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A UAV of a running swarm."""
+
+    uav: int
+    system: int
+    """Its MAVLink system id."""
+    role: str
+    """"follower" or "leader"."""
+    port: int
+    """Where its autopilot hears whoever calls."""
+    hears: tuple[int, ...]
+    """By whose links it hears."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A running swarm."""
+
+    name: str
+    pid: int
+    scenario: str
+    folder: str
+    vehicles: tuple[Card, ...]
+    key: str | None
+    """Key file, where its links to the ground are signed."""
+    ports: tuple[int, int]
+    """First and last port of its block."""
+    viewer: str | None
+    started: float
+    """Wall time, s since 1970."""
+
+
+def _card(name: str) -> Path:
+    return runtime_folder() / f"{name}.json"
+
+
+def _socket_path(name: str) -> Path:
+    return runtime_folder() / f"{name}.sock"
+
+
+def check_name(name: str) -> None:
+    """Refuse a swarm's name that is taken, or too long for its sockets; it may get some more characters yet.
+
+    Raises
+    ------
+    UserError
+    """
+    room = _LONGEST_PATH - len(os.fsencode(runtime_folder())) - len("/.feed")
+    if len(os.fsencode(name)) > room:
+        raise UserError(f"a swarm called {name!r} is listed in {runtime_folder()}: its name may have {room} bytes")
+    if any(entry.name == name for entry in running_swarms()):
+        raise UserError(f"a swarm called {name!r} is running; give another folder with --out")
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def running_swarms() -> list[Entry]:
+    """All swarms whose launcher is alive; cards of dead launchers are removed."""
+    found = []
+    for path in sorted(runtime_folder().glob("*.json")):
+        try:
+            data = json.loads(path.read_text())
+            cards = tuple(Card(**{**card, "hears": tuple(card["hears"])}) for card in data["vehicles"])
+            entry = Entry(**{**data, "vehicles": cards, "ports": tuple(data["ports"])})
+        except (ValueError, TypeError, KeyError, FileNotFoundError):
+            continue  # being written or removed at this very moment, or not ours
+        if _alive(entry.pid):
+            found.append(entry)
+        else:
+            for stale in (path, _socket_path(entry.name)):
+                stale.unlink(missing_ok=True)
+    return found
+
+
+def find_swarm(name: str | None) -> Entry:
+    """The running swarm called ``name``, or the only one.
+
+    Raises
+    ------
+    LookupError
+        If there is no such swarm, or ``name`` was needed to choose.
+    """
+    entries = running_swarms()
+    names = ", ".join(entry.name for entry in entries) or "none"
+    if name is None:
+        if len(entries) == 1:
+            return entries[0]
+        raise LookupError(
+            "no swarm is running" if not entries else f"several swarms are running, name one of them: {names}"
+        )
+    for entry in entries:
+        if entry.name == name:
+            return entry
+    raise LookupError(f"no swarm {name!r} is running; running: {names}")
+
+
+def ask_swarm(entry: Entry, command: str, **arguments: Any) -> Any:
+    """Tell a swarm what to do and return its answer.
+
+    Raises
+    ------
+    RuntimeError
+        If it refuses.
+    OSError
+        If it does not answer.
+    """
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(5.0)
+        link.connect(str(_socket_path(entry.name)))
+        link.sendall(json.dumps({"command": command, **arguments}).encode() + b"\n")
+        answer = json.loads(link.makefile().readline())
+    if not answer.get("ok"):
+        raise RuntimeError(answer.get("error", "refused"))
+    return answer.get("value")
+
+
+class Control:
+    """The launcher's end: a card in the list and a socket that takes commands, a JSON object a line."""
+
+    def __init__(self, entry: Entry, handle: Callable[[str, dict[str, Any]], Any]) -> None:
+        self._entry = entry
+        self._handle = handle
+        self._path = _socket_path(entry.name)
+        self._path.unlink(missing_ok=True)
+        self._server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._server.bind(str(self._path))
+        self._server.listen()
+        self._server.setblocking(False)
+        card = _card(entry.name)
+        card.with_suffix(".new").write_text(json.dumps(asdict(entry)))
+        card.with_suffix(".new").rename(card)
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return self._server.fileno()
+
+    def serve(self) -> None:
+        """Answer one caller; a caller that sends nonsense, or nothing for half a second, is turned away."""
+        with contextlib.suppress(BlockingIOError):
+            link, _ = self._server.accept()
+            with link:
+                link.settimeout(0.5)
+                try:
+                    request = json.loads(link.makefile().readline())
+                    command = request.pop("command")
+                    answer = {"ok": True, "value": self._handle(command, request)}
+                except Exception as error:  # whatever is wrong with a request, the swarm flies on
+                    answer = {"ok": False, "error": str(error) or repr(error)}
+                with contextlib.suppress(OSError):
+                    link.sendall(json.dumps(answer).encode() + b"\n")
+
+    def close(self) -> None:
+        """Leave the list."""
+        self._server.close()
+        _card(self._entry.name).unlink(missing_ok=True)
+        self._path.unlink(missing_ok=True)

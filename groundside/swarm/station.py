@@ -1,0 +1,287 @@
+"""A ground station for a running swarm: commands, faults, link failures and parameters, each acknowledged.
+
+    with Station() as station:
+        station.fault(3, "elevator", effectiveness=0.6, bias=0.2)
+
+It speaks MAVLink with the autopilots, as anybody's ground station does, and knows from the list of running swarms where
+they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Self
+
+from ftcc.groundside.swarm.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
+from ftcc.link.failures import KINDS, UNITS
+from ftcc.link.mavlink import AUTOPILOT, dialect
+from ftcc.link.modes import code_of, mode_called
+
+__all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState"]
+
+ACTUATORS = {
+    "aileron": ("servo", 1),
+    "elevator": ("servo", 2),
+    "rudder": ("servo", 3),
+    "thrust": ("motor", 1),
+    "bank": ("servo", 1),
+    "load_factor": ("servo", 2),
+}
+"""Unit and instance of what can fail on board by our names; the last two are what a point mass is steered by."""
+
+_NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
+
+_ON_BOARD = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
+
+
+@dataclass
+class VehicleState:
+    """What a UAV tells of itself."""
+
+    uav: int
+    role: str
+    mode: str
+    t: float
+    """Simulated time, s."""
+    altitude: float
+    """m."""
+    airspeed: float
+    """m/s."""
+    fault_tolerance: bool | None = None
+    """None where the scheme has none to switch."""
+
+
+class Station(Conversation):
+    """A ground station for a running swarm, see `Conversation` for how it is made."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def vehicles(self) -> list[VehicleState | NoAnswerError]:
+        """What each UAV tells of itself, or that it does not answer."""
+        found: list[VehicleState | NoAnswerError] = []
+        for uav in self.uavs:
+            try:
+                found.append(self.state(uav))
+            except NoAnswerError as error:
+                found.append(error)
+        return found
+
+    def state(self, uav: int) -> VehicleState:
+        """What one UAV tells of itself."""
+        beat = self.request(uav, dialect.MAVLINK_MSG_ID_HEARTBEAT)
+        place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+        card = self.card(uav)
+        speed = math.sqrt(place.vx**2 + place.vy**2 + place.vz**2)
+        try:
+            tolerant: bool | None = bool(self.get(uav, "FTCC_FT"))
+        except RefusedError:
+            tolerant = None
+        mode = mode_called(beat.custom_mode)
+        return VehicleState(uav, card.role, mode, place.time_boot_ms / 1e3, -place.z, speed, tolerant)
+
+    # Faults.
+
+    def fault(
+        self,
+        uav: int,
+        what: str,
+        *,
+        kind: str = "wrong",
+        at: float | None = None,
+        **sizes: float,
+    ) -> float:
+        """Make something on board fail.
+
+        Parameters
+        ----------
+        what : "aileron", "elevator", "rudder", "thrust", or of a point mass "bank", "load_factor"; or "position",
+            "attitude" of the navigation solution.
+        kind : "wrong", "off", "stuck", "slow", "intermittent" or "ok".
+        at : simulated time, s; None: at once.
+        sizes : parameters by their names without FAIL_, in small letters, such as ``eff=0.6, bias=0.2``.
+
+        Returns
+        -------
+        float
+            The simulated time at which it acts, s.
+
+        Raises
+        ------
+        NoAnswerError, RefusedError
+        """
+        if what not in _ON_BOARD:
+            raise StationError(f"{what}: nothing of that name can fail; there are {', '.join(_ON_BOARD)}")
+        unit, instance = _ON_BOARD[what]
+        return self.inject(uav, unit, kind, instance, at=at, **sizes)
+
+    def repair(self, uav: int, what: str | None = None, *, at: float | None = None) -> None:
+        """Repair something on board, or everything."""
+        if what is not None:
+            self.fault(uav, what, kind="ok", at=at)
+            return
+        for unit, instance in (("servo", 0), ("motor", 1), ("gps", 1), ("gyro", 1)):
+            self.inject(uav, unit, "ok", instance, at=at)
+
+    def inject(
+        self, uav: int, unit: str, kind: str, instance: int = 0, *, at: float | None = None, **sizes: float
+    ) -> float:
+        """MAV_CMD_INJECT_FAILURE by our names of unit and kind, see `ftcc.link.failures`; the time at which it acts."""
+        if unit not in UNITS or kind not in KINDS:
+            raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
+        timed = _At(self, uav, at)
+        for name, value in sizes.items():
+            as_float32(f"FAIL_{name.upper()}", value)
+        for name, value in sizes.items():
+            self.set(uav, f"FAIL_{name.upper()}", value)
+        with timed:
+            ack = self.command(uav, dialect.MAV_CMD_INJECT_FAILURE, UNITS[unit].code, KINDS[kind], instance)
+        return float(ack.result_param2) / 1e3
+
+    # Links.
+
+    def cut(self, a: int, b: int | None = None, *, at: float | None = None) -> list[str]:
+        """Cut the links between two UAVs, or the radio of one; what went wrong at one of two ends, empty if nothing."""
+        if b is None:
+            self.inject(a, "radio", "off", at=at)
+            return []
+        return self._both_ends(a, b, lambda uav, sender: self.inject(uav, "radio", "off", sender, at=at))
+
+    def restore(self, a: int, b: int | None = None, *, at: float | None = None) -> list[str]:
+        """Restore the links between two UAVs, or all of one and its radio; what went wrong, as `cut`."""
+        if b is not None:
+            return self._both_ends(a, b, lambda uav, sender: self.inject(uav, "radio", "ok", sender, at=at))
+        self.inject(a, "radio", "ok", at=at)
+        return self._at_hearers(a, lambda uav: self.inject(uav, "radio", "ok", a, at=at))
+
+    def degrade(self, a: int, b: int | None = None, *, at: float | None = None, **sizes: float) -> list[str]:
+        """Degrade the links between two UAVs, or all of one; what went wrong, as `cut`.
+
+        ``sizes``: loss, burst_s, burst_e, burst_l (probabilities), delay, jitter (s).
+        """
+        kinds = {
+            "intermittent": {n: v for n, v in sizes.items() if n in ("loss", "burst_s", "burst_e", "burst_l")},
+            "delayed": {n: v for n, v in sizes.items() if n == "delay"},
+            "slow": {n: v for n, v in sizes.items() if n == "jitter"},
+        }
+        if not any(kinds.values()):
+            raise StationError("degrade: say by how much: loss, burst_s, burst_e, burst_l, delay or jitter")
+
+        def degrade(uav: int, sender: int) -> None:
+            for kind, given in kinds.items():
+                if given:
+                    # A size that is left out is none at all, not the one of last time.
+                    none = _NO_LOSS if kind == "intermittent" else {}
+                    self.inject(uav, "radio", kind, sender, at=at, **(none | given))
+
+        if b is not None:
+            return self._both_ends(a, b, degrade)
+        degrade(a, 0)
+        return self._at_hearers(a, lambda uav: degrade(uav, a))
+
+    def _both_ends(self, a: int, b: int, do: Callable[[int, int], object]) -> list[str]:
+        ends = [(u, v) for u, v in ((a, b), (b, a)) if v in self.card(u).hears]
+        if not ends:
+            raise StationError(f"there is no link between UAV {a} and UAV {b}")
+        return self._each([u for u, _ in ends], lambda uav: do(uav, b if uav == a else a))
+
+    def _at_hearers(self, a: int, do: Callable[[int], object]) -> list[str]:
+        return self._each([uav for uav in self.uavs if a in self.card(uav).hears], do)
+
+    def _each(self, uavs: Iterable[int], do: Callable[[int], object]) -> list[str]:
+        """Do something at each of several UAVs; what went wrong where, unless it went wrong everywhere."""
+        failed: list[StationError] = []
+        uavs = list(uavs)
+        for uav in uavs:
+            try:
+                do(uav)
+            except (NoAnswerError, RefusedError) as error:
+                failed.append(error)
+        if failed and len(failed) == len(uavs):
+            raise failed[0]
+        return [str(error) for error in failed]
+
+    def fault_tolerance(self, uav: int, on: bool) -> None:
+        """Switch the fault tolerance of a UAV's law on or off."""
+        self.set(uav, "FTCC_FT", float(on))
+
+    # Motion.
+
+    def lead(
+        self, uav: int, *, altitude: float | None = None, speed: float | None = None, at: float | None = None
+    ) -> None:
+        """Give a leader another altitude (m) or speed (m/s), at a simulated time (s) or at once."""
+        if altitude is None and speed is None:
+            raise StationError("a leader needs an altitude or a speed")
+        with _At(self, uav, at):
+            if altitude is not None:
+                frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
+                self.command(uav, dialect.MAV_CMD_DO_CHANGE_ALTITUDE, altitude, frame)
+            if speed is not None:
+                self.command(uav, dialect.MAV_CMD_DO_CHANGE_SPEED, dialect.SPEED_TYPE_AIRSPEED, speed, -1.0)
+
+    def mode(self, uav: int, mode: str) -> None:
+        """Set the mode: "mission", "hold" or "offboard"."""
+        code = code_of(mode)
+        if code is None:
+            raise StationError(f"mode {mode}: there are mission, hold and offboard")
+        flags = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        self.command(uav, dialect.MAV_CMD_DO_SET_MODE, flags, code >> 16 & 0xFF, code >> 24)
+
+    def attitude(self, uav: int, *, bank: float, alpha: float, beta: float = 0.0) -> None:
+        """Have a UAV of an attitude scheme fly another attitude (rad) with respect to its velocity, for good."""
+        # It loads numba, which no other command needs.
+        from ftcc.link.rotation import body_attitude
+
+        place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+        gamma = math.atan2(-place.vz, math.hypot(place.vx, place.vy))
+        wanted = body_attitude(math.atan2(place.vy, place.vx), gamma, bank, alpha, beta)
+        ignored = (
+            dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+            | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+            | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+            | dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
+        )
+        target = dialect.MAVLink_set_attitude_target_message(
+            0, self.system(uav), AUTOPILOT, ignored, wanted, 0.0, 0.0, 0.0, 0.0
+        )
+        self.set(uav, "COM_OF_LOSS_T", 0.0)
+        self.send(uav, target)
+        self.mode(uav, "offboard")
+        self.send(uav, target)
+
+
+class _At:
+    """Parameter FTCC_AT for as long as a request lasts."""
+
+    def __init__(self, station: Station, uav: int, at: float | None) -> None:
+        self._station, self._uav = station, uav
+        self._ms = 0 if at is None else _milliseconds(at)
+
+    def __enter__(self) -> None:
+        self._station.set(self._uav, "FTCC_AT", self._ms)
+
+    def __exit__(self, *_: object) -> None:
+        if self._ms != 0:
+            self._station.set(self._uav, "FTCC_AT", 0)
+
+
+def _milliseconds(at: float) -> int:
+    """A simulated time (s) in whole ms, as MAVLink has it.
+
+    Raises
+    ------
+    StationError
+        If it is no time to come, or has a fraction of a ms.
+    """
+    if not 0.0 <= at * 1e3 < 2**31:
+        raise StationError(f"at = {at:.10g}: must be a simulated time from 0 to {(2**31 - 1) / 1e3} s")
+    ms = round(at * 1e3)
+    if abs(at * 1e3 - ms) > 1e-3:
+        raise StationError(f"at = {at:.10g} s: must be a whole number of ms")
+    return ms

@@ -1,0 +1,266 @@
+"""What a recording shows of how the flight went: tracking errors, bounds, saturation, limit cycles, losses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.claims import Signals, evaluated, names_in
+from ftcc.groundside.verdict.oscillation import is_driven, oscillation
+from ftcc.groundside.verdict.verdict import LimitCycle, Loss, Outside, Saturation, TrackingError, Verdict
+from ftcc.link.actuators import SLOT, unit_of
+from ftcc.sim.plants import conditions_of, find
+
+if TYPE_CHECKING:
+    from ftcc.groundside.scenario import Mission
+
+__all__ = ["judge"]
+
+Array = NDArray[np.float64]
+_MEMORY = 32 << 20
+"""Bytes of values that are kept for when they are asked for again."""
+
+END, LEAST_END = 0.05, 2.0
+"""What counts as the end of a flight, for errors and bounds: this share of it, so many seconds at least."""
+HULL = 1.0
+"""How far outside the leaders' hull a UAV may be, m; counted from when it first was inside."""
+LONG = 0.2
+"""Share of its flight that an actuator may be at its limits without a remark."""
+RIPPLE = 0.02
+"""Share of an actuator's travel up to which it may oscillate."""
+ALLOWED = {"m": 5.0, "m/s": 1.0, "rad": 0.1}
+"""Tracking errors at the end, where the scheme does not say what is small; by unit, others are told and not judged."""
+
+_AT_LIMIT = 1e-6
+"""Of the travel: commands are float32."""
+_NO_LIMIT = 1e6
+"""A travel beyond this is none."""
+_TOGETHER = 2.0
+"""UAVs whose recordings end within so many seconds flew to the end: processes that are stopped stop one by one."""
+_CLOSE = 1e-6
+"""Rounding of times, s."""
+
+_HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
+          "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
+"""Where leaders are several, all shall be between their altitudes, and who tracks ``x_d`` between their positions."""
+
+
+def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
+    """How a flight went.
+
+    Parameters
+    ----------
+    signals : Signals
+        The recording.
+    mission : Mission
+    lost : mapping
+        When (s) and why a UAV was lost, by id.
+    """
+    flight = _Flight(signals, mission, lost)
+    saturation = sorted(_saturation(flight), key=lambda one: -one.share)
+    return Verdict(
+        flown=flight.end if flight.end < mission.timing.duration - flight.row - _CLOSE else mission.timing.duration,
+        planned=mission.timing.duration,
+        tracking=tuple(_tracking(flight)),
+        outside=tuple(_outside(flight)),
+        saturation=tuple(saturation),
+        saturated=tuple(one for one in saturation if one.share > LONG),
+        limit_cycles=tuple(_limit_cycles(flight)),
+        lost=tuple(_losses(flight)),
+    )
+
+
+class _Flight:
+    """A recording with what its mission says of it."""
+
+    def __init__(self, signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> None:
+        self.signals = signals
+        self.mission = mission
+        self.graph = mission.graph
+        self.lost = lost
+        self._values: dict[tuple[str, int], Array] = {}
+        self._room = _MEMORY
+        self.row = mission.timing.record_every * mission.timing.period
+        """Time from row to row, s."""
+        self.until = {uav: float(t[-1]) for uav in signals.uavs if len(t := signals.column("t", uav))}
+        """When the recording of a UAV ends, s."""
+        self.end = max(self.until.values(), default=0.0)
+        self.closing = self.end - min(max(END * self.end, LEAST_END), self.end / 2.0) - _CLOSE
+        """When the end begins, s."""
+        self.followers = [uav for uav in self.graph.followers if uav in self.until]
+
+    def times(self, uav: int) -> Array:
+        """Of a UAV's rows, s."""
+        return self.signals.column("t", uav)
+
+    def lasted(self, uav: int) -> bool:
+        """Whether a UAV flew to the end."""
+        return uav not in self.lost and self.until.get(uav, -1.0) >= self.end - _TOGETHER
+
+    def of(self, expression: str, uav: int) -> Array:
+        """An expression at all times of a UAV."""
+        found = self._values.get((expression, uav))
+        if found is None:
+            found = evaluated(expression, self.signals, self.graph, uav)
+            if found.nbytes <= self._room:
+                self._room -= found.nbytes
+                self._values[expression, uav] = found
+        return found
+
+    def has(self, expression: str) -> bool:
+        """Whether the recording can say it: places between leaders need leaders that reach everybody."""
+        names = names_in(expression)
+        places = names & (set(_HULLS) | {name for name, _ in _HULLS.values()})
+        led = bool(self.graph.leaders) and set(self.graph.followers) <= self.graph.reached_from(self.graph.leaders)
+        return names - places <= set(self.signals.names) and (led or not places)
+
+
+def _losses(flight: _Flight) -> Iterator[Loss]:
+    for uav in flight.mission.uavs:
+        if uav in flight.lost:
+            yield Loss(uav, *flight.lost[uav])
+        elif flight.end > 0.0 and not flight.lasted(uav):
+            yield Loss(uav, flight.until.get(uav, 0.0), "its recording ends")
+
+
+def _tracking(flight: _Flight) -> Iterator[TrackingError]:
+    """Every tracking error that the scheme declares."""
+    for error in flight.mission.scheme.tracking:
+        if not flight.has(error.name):
+            continue
+        largest, end = (-1.0, 0, 0.0), (-1.0, 0)
+        too_large = False
+        for uav in flight.followers:
+            t = flight.times(uav)
+            x = np.abs(flight.of(error.name, uav))
+            there = np.flatnonzero(np.isfinite(x))
+            if not len(there):
+                continue
+            worst = there[int(np.argmax(x[there]))]
+            largest = max(largest, (float(x[worst]), uav, float(t[worst])), key=lambda one: one[0])
+            late = there[t[there] >= flight.closing]
+            if flight.lasted(uav) and len(late):
+                end = max(end, (float(x[late].max()), uav), key=lambda one: one[0])
+                allowed = _allowed(flight, error.bound, error.unit, uav)
+                too_large |= allowed is not None and bool((x[late] > np.broadcast_to(allowed, x.shape)[late]).any())
+        if largest[0] < 0.0:
+            continue
+        size, whose = end if end[1] else (None, None)
+        small = None if whose is None else _allowed(flight, error.bound, error.unit, whose)
+        # A bound that is a signal counts as it is in the end.
+        least = None if small is None else float(np.ravel(small)[-1])
+        yield TrackingError(error.name, error.unit, error.meaning, *largest, size, whose, least, too_large)
+
+
+def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) -> Array | float | None:
+    if isinstance(bound, str):
+        return np.abs(flight.of(bound, uav))
+    return bound if bound is not None else ALLOWED.get(unit)
+
+
+def _outside(flight: _Flight) -> Iterator[Outside]:
+    """Bounds of signals, and the leaders' hull, that a UAV left."""
+    for signal in flight.mission.scheme.signals:
+        for uav in flight.followers if signal.bound is not None else ():
+            bound = np.abs(flight.of(str(signal.bound), uav))
+            beyond = np.abs(flight.of(signal.name, uav)) > bound
+            name = f"bound {signal.bound} of {signal.name}"
+            yield from _left(flight, name, signal.meaning, uav, beyond)
+    if len(flight.graph.leaders) < 2:
+        return
+    tracked = frozenset[str]().union(*(names_in(error.name) for error in flight.mission.scheme.tracking))
+    for place, (distance, name) in _HULLS.items():
+        asked = place in tracked or place == "z_d"
+        for uav in flight.followers if asked and flight.has(distance) else ():
+            away = flight.of(distance, uav)
+            inside = away <= HULL
+            entered = np.logical_or.accumulate(inside) | ~inside.any()
+            beyond = entered & (away > HULL)
+            yield from _left(flight, name, f"more than {HULL:g} m outside", uav, beyond)
+
+
+def _left(flight: _Flight, name: str, meaning: str, uav: int, beyond: NDArray[np.bool_]) -> Iterator[Outside]:
+    rows = np.flatnonzero(beyond)
+    if len(rows):
+        until = float(flight.times(uav)[rows[-1]])
+        at_end = flight.lasted(uav) and until >= flight.closing
+        yield Outside(name, meaning, uav, len(rows) * flight.row, until, at_end)
+
+
+class _Actuator(NamedTuple):
+    name: str
+    low: float
+    high: float
+
+    @property
+    def travel(self) -> float:
+        return self.high - self.low
+
+
+def _actuators(flight: _Flight, uav: int) -> list[_Actuator]:
+    """The actuators of a UAV that can move."""
+    limits = next(vehicle.limits for vehicle in flight.mission.vehicles if vehicle.uav == uav)
+    found = [_Actuator(name, *limits[SLOT[name]]) for name in find(flight.mission.plant).ACTUATORS]
+    return [one for one in found if 0.0 < one.travel < _NO_LIMIT]
+
+
+def _saturation(flight: _Flight) -> Iterator[Saturation]:
+    for uav in flight.followers:
+        for actuator in _actuators(flight, uav):
+            command = flight.signals.column(f"{actuator.name}_command", uav)
+            close = _AT_LIMIT * actuator.travel
+            share = float(((command <= actuator.low + close) | (command >= actuator.high - close)).mean())
+            if share > 0.0:
+                yield Saturation(actuator.name, uav, share)
+
+
+def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
+    """The worst oscillation of each UAV, in shares of what is allowed."""
+    given: list[float] | None = None
+    worst: dict[int, tuple[float, LimitCycle]] = {}
+    for uav, name, unit, signal, floor in _oscillating(flight):
+        found = oscillation(flight.times(uav), flight.of(signal, uav), floor)
+        if found is None or (uav in worst and found.amplitude / floor <= worst[uav][0]):
+            continue
+        given = _given(flight) if given is None else given
+        if not is_driven(found.frequency, given):
+            worst[uav] = found.amplitude / floor, LimitCycle(name, unit, uav, *found)
+    for uav in flight.followers:
+        if uav in worst:
+            yield worst[uav][1]
+
+
+def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
+    """What may oscillate: UAV, name, unit, column or expression, and the amplitude up to which it may.
+
+    One signal of all UAVs after the other, as a recording is read.
+    """
+    lasting = [uav for uav in flight.followers if flight.lasted(uav)]
+    actuators = {uav: {one.name: one for one in _actuators(flight, uav)} for uav in lasting}
+    for name in find(flight.mission.plant).ACTUATORS:
+        for uav in lasting:
+            if name in actuators[uav]:
+                yield uav, name, unit_of(name), f"{name}_command", RIPPLE * actuators[uav][name].travel
+    for error in flight.mission.scheme.tracking:
+        floor = error.bound if isinstance(error.bound, float) else ALLOWED.get(error.unit)
+        if floor is not None and flight.has(error.name):
+            for uav in lasting:
+                yield uav, error.name, error.unit, error.name, floor
+
+
+def _given(flight: _Flight) -> list[float]:
+    """Frequencies that the scenario or the ground commands, rad/s.
+
+    Leaders' motion, what UAVs refer to by themselves, and what fails or disturbs in a rhythm, as an intermittent fault
+    does.
+    """
+    signals = flight.signals
+    own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]
+    conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
+    columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in ("z", "V")]
+    columns += [(uav, name) for name in own + conditions for uav in flight.followers]
+    found = (oscillation(flight.times(uav), signals.column(name, uav)) for uav, name in columns)
+    return [one.frequency for one in found if one is not None]
