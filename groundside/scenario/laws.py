@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -110,7 +110,7 @@ def check_scheme(
 
 
 def briefings(
-    scheme: Scheme, vehicles: list[VehicleSpec], profiles: dict[int, Profile]
+    scheme: Scheme, vehicles: Iterable[VehicleSpec], profiles: Mapping[int, Profile]
 ) -> dict[int, tuple[float, ...]]:
     """What each UAV's hearers know of it before they hear it, by id: its shared values at t = 0, accelerations as 0."""
     if not scheme.briefed:

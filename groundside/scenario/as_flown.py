@@ -1,0 +1,44 @@
+"""The scenario as it was flown: one file with everything that flies the same flight again."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import platform
+
+import tomli_w
+
+from ftcc.airside.scheme import Scheme
+from ftcc.groundside.scenario.laws import followed_by_gains
+from ftcc.groundside.scenario.loading import Scenario
+
+__all__ = ["as_flown"]
+
+_VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "eclipse-zenoh")
+"""What the numbers of a flight may depend on."""
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    return {name: importlib.metadata.version(name) for name in _VERSIONED} | {"python": platform.python_version()}
+
+
+def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
+    gains = scheme.gains(scenario.form, scenario.plan.gains.common, followed_by_gains(scenario.plan))
+    return gains._asdict()  # type: ignore[no-any-return]
+
+
+def as_flown(scenario: Scenario, scheme: Scheme) -> str:
+    """The merged scenario with seed, versions, and every gain by value: a later default must not change it."""
+    document = {key: value for key, value in scenario.document.items() if key != "flown"}
+    document["seed"] = scenario.plan.seed
+    gains = document.get("gains", {})
+    document["gains"] = gains | _all_gains(scenario, scheme)
+    document["flown"] = {
+        "name": scenario.name,
+        "form": scenario.form,
+        "variants": list(scenario.variants),
+        "settings": list(scenario.settings),
+        "versions": _versions(),
+    }
+    return tomli_w.dumps(document)
