@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.groundside.claims.metrics import (
+from ftcc.groundside.claims.expressions import (
     DERIVED,
-    METRICS,
     Signals,
     check_expression,
     evaluated,
@@ -20,6 +19,7 @@ from ftcc.groundside.claims.metrics import (
     uavs_in,
     window_of,
 )
+from ftcc.groundside.claims.metrics import METRICS
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 

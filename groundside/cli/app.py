@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, view
+from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, swarms, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.cli.examples import EXAMPLES
 from ftcc.groundside.cli.version import show_versions
@@ -34,7 +34,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         study.study,
         airframe.airframe,
     ),
-    "Flights": (fly.fly, fly.ps, fly.stop, view.watch, fly.doctor),
+    "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),
     "Results": (results.report, results.compare, view.replay),
     "Commands to a running swarm": (
         ground.vehicles,

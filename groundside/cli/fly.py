@@ -1,4 +1,4 @@
-"""The commands that deal with running swarms: fly, ps, stop, doctor."""
+"""The command ``ftcc fly``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 import typer
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
-from rich.table import Table
 
 from ftcc.groundside.cli.common import (
     Duration,
@@ -33,11 +32,13 @@ from ftcc.groundside.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from ftcc.groundside.dashboard import Pace
-    from ftcc.groundside.swarm import Entry
+    from ftcc.groundside.dashboard import Event, Pace
+    from ftcc.groundside.scenario import Mission
+    from ftcc.groundside.swarm import FlightOptions, Outcome, Viewer
     from ftcc.link.addresses import Address
+    from ftcc.link.ports import PortBlock
 
-__all__ = ["doctor", "fly", "ps", "stop"]
+__all__ = ["fly"]
 
 _FLIGHT_FAILED = 1
 _LAST_SYSTEM = 239
@@ -134,15 +135,8 @@ def fly(
     strict: Strict = False,
 ) -> None:
     """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
-    from ftcc.groundside.swarm import Clock, Viewer
-
     factor = speed_factor(speed, "--speed")
-    if clock not in get_args(Clock):
-        fail(f"--clock {clock}: must be one of {', '.join(get_args(Clock))}")
-    if clock == "wall" and math.isinf(factor):
-        fail("--clock wall --speed max: the wall clock needs a factor; as fast as possible flies --clock lockstep")
-    if viewer not in get_args(Viewer):
-        fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
+    _check_choices(clock, factor, viewer)
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     if not mission.wire:
         fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
@@ -152,32 +146,51 @@ def fly(
     _check_systems(max(uavs), id_offset)
     _check_key(key, [uav + id_offset for uav in uavs])
 
-    from ftcc.groundside.swarm import check_name, provide_files
+    from ftcc.groundside.swarm import FlightOptions, check_name, provide_files
 
     provide_files(mission, count, len(listeners))
     check_name(f"{mission.name}-20000101-000000-2" if out is None else out.name)
-
-    from ftcc.groundside.dashboard import Event
-    from ftcc.groundside.swarm import FlightOptions, fly_swarm
-    from ftcc.link.ports import PortError, reserve
-
-    try:
-        ports = reserve(uavs, port)
-    except PortError as error:
-        fail(str(error))
-    folder = new_run_folder(mission, out)
+    ports = _reserve(uavs, port)
     options = FlightOptions(
-        folder=folder,
+        folder=new_run_folder(mission, out),
         lockstep=clock == "lockstep",
         speed=factor,
         pack=count,
         held=hold,
-        viewer=cast(Viewer, viewer),
+        viewer=cast("Viewer", viewer),
         open_browser=browser,
         listeners=listeners,
         key=key,
         id_offset=id_offset,
     )
+    outcome, wall = _fly_on_the_terminal(mission, options, ports)
+    _report(outcome, wall, mission, options.folder, strict)
+
+
+def _check_choices(clock: str, factor: float, viewer: str) -> None:
+    from ftcc.groundside.swarm import Clock, Viewer
+
+    if clock not in get_args(Clock):
+        fail(f"--clock {clock}: must be one of {', '.join(get_args(Clock))}")
+    if clock == "wall" and math.isinf(factor):
+        fail("--clock wall --speed max: the wall clock needs a factor; as fast as possible flies --clock lockstep")
+    if viewer not in get_args(Viewer):
+        fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
+
+
+def _reserve(uavs: list[int], port: int | None) -> PortBlock:
+    from ftcc.link.ports import PortError, reserve
+
+    try:
+        return reserve(uavs, port)
+    except PortError as error:
+        fail(str(error))
+
+
+def _fly_on_the_terminal(mission: Mission, options: FlightOptions, ports: PortBlock) -> tuple[Outcome, float]:
+    """Fly, with events and progress on the terminal; the outcome, and the wall time of the flight, s."""
+    from ftcc.groundside.swarm import fly_swarm
+
     console = terminal()
     bar = Progress(
         TextColumn("{task.description}"),
@@ -188,7 +201,7 @@ def fly(
     )
     begun = time.monotonic()
 
-    def say(event: Event) -> None:
+    def print_event(event: Event) -> None:
         who = f"UAV {event.uav}: " if event.uav else ""
         colour = _COLOURS.get(event.severity, "white")
         bar.console.print(f"[{colour}]{max(event.t, 0.0):8.2f} s[/]  {who}{escape(event.text)}", soft_wrap=True)
@@ -202,24 +215,28 @@ def fly(
         bar.update(task, description=f"flying {mission.case}")
         if address:
             bar.console.print(f"dashboard: {address}", soft_wrap=True)
-        if hold:
+        if options.held:
             bar.console.print("held at t = 0: `ftcc resume` lets it fly")
 
-    console.print(f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {folder}", soft_wrap=True)
+    title = f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {options.folder}"
+    console.print(title, soft_wrap=True)
     with bar:
         task = bar.add_task("starting", total=mission.timing.duration, pace="")
         try:
-            outcome = fly_swarm(mission, options, ports, say, show_progress, started)
+            outcome = fly_swarm(mission, options, ports, print_event, show_progress, started)
         except TimeoutError as error:
             console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
             raise typer.Exit(_FLIGHT_FAILED) from error
+    return outcome, time.monotonic() - begun
+
+
+def _report(outcome: Outcome, wall: float, mission: Mission, folder: Path, strict: bool) -> None:
+    """Claims, pace, dead processes and the verdict; exits with code 1 where the flight failed."""
+    console, logs = terminal(), folder / "logs"
     if outcome.died and not outcome.ticks:
-        console.print(
-            f"[bold red]nothing flew: {', '.join(outcome.died)} died at the start[/]; see {folder / 'logs'}",
-            soft_wrap=True,
-        )
+        died = ", ".join(outcome.died)
+        console.print(f"[bold red]nothing flew: {died} died at the start[/]; see {logs}", soft_wrap=True)
         raise typer.Exit(_FLIGHT_FAILED)
-    wall = time.monotonic() - begun
     show_claims(folder)
     share = 100.0 * outcome.late / max(outcome.ticks, 1)
     flown = outcome.flown * mission.timing.period
@@ -229,88 +246,8 @@ def fly(
     )
     if not outcome.ok:
         for name in outcome.died:
-            console.print(f"[bold red]process {name} died[/]; see {folder / 'logs'}", soft_wrap=True)
+            console.print(f"[bold red]process {name} died[/]; see {logs}", soft_wrap=True)
     if outcome.verdict is not None:
         judged(outcome.verdict, strict)
     if not outcome.ok:
         raise typer.Exit(_FLIGHT_FAILED)
-
-
-def _how_it_flies(entry: Entry) -> str:
-    """Held, or how many times real time, and what limits it."""
-    from ftcc.groundside.swarm import ask_swarm
-
-    try:
-        told = ask_swarm(entry, "status") or {}
-    except (OSError, RuntimeError):
-        return "does not answer"
-    if told.get("state") != "flying" or told.get("factor") is None:
-        return str(told.get("state", ""))
-    return f"{told['factor']:.2g} x real time" + (f": {told['limit']}" if told["limit"] else "")
-
-
-def ps() -> None:
-    """List the running swarms."""
-    from ftcc.groundside.swarm import running_swarms
-
-    entries = running_swarms()
-    if not entries:
-        terminal().print("no swarm is running")
-        return
-    table = Table("name", "scenario", "UAVs", "pid", "ports", "since", "flies", "dashboard", box=None)
-    for entry in entries:
-        table.add_row(
-            entry.name,
-            entry.scenario,
-            str(len(entry.vehicles)),
-            str(entry.pid),
-            f"{entry.ports[0]}-{entry.ports[1]}",
-            time.strftime("%H:%M:%S", time.localtime(entry.started)),
-            _how_it_flies(entry),
-            entry.viewer or "",
-        )
-    terminal().print(table)
-
-
-_Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
-
-
-def _tell(name: str | None, command: str) -> None:
-    from ftcc.groundside.swarm import ask_swarm, find_swarm
-
-    try:
-        ask_swarm(find_swarm(name), command)
-    except LookupError as error:
-        fail(str(error))
-    except (OSError, RuntimeError) as error:
-        terminal().print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
-        raise typer.Exit(_FLIGHT_FAILED) from error
-
-
-def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all swarms.")] = False) -> None:
-    """End a running swarm in order; its run stays complete up to now."""
-    from ftcc.groundside.swarm import running_swarms
-
-    names: list[str | None] = [entry.name for entry in running_swarms()] if every else [name]
-    for one in names:
-        _tell(one, "stop")
-
-
-def doctor(
-    scenario: Annotated[
-        str, typer.Argument(help="Scenario that is flown to measure.", autocompletion=scenario_names)
-    ] = "demo",
-    variant: Variants = "",
-    speed: Annotated[str, typer.Option(help="Times real time that are wanted, or 'max'.")] = "1",
-) -> None:
-    """Say what this machine has, and, by flying a scenario for some seconds, how fast it flies it."""
-    from ftcc.groundside.swarm import examine
-
-    factor = speed_factor(speed, "--speed")
-    mission = load_mission(scenario, None, variant, None, None, None)
-    table = Table("what", "found", "verdict", box=None)
-    console = terminal()
-    with console.status("looking around") as status:
-        for row in examine(mission, factor, progress=status.update):
-            table.add_row(*map(escape, row))
-    console.print(table)

@@ -6,6 +6,7 @@ from .flight import Clock as Clock
 from .flight import FlightOptions as FlightOptions
 from .flight import Viewer as Viewer
 from .flight import fly_swarm as fly_swarm
+from .launcher import Outcome as Outcome
 from .launcher import automatic_pack as automatic_pack
 from .launcher import no_main_module as no_main_module
 from .open_files import provide_files as provide_files

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside.claims.claims import Result
-from ftcc.groundside.claims.metrics import unwrapped, wrapped
+from ftcc.groundside.claims.expressions import unwrapped, wrapped
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ftcc.groundside.claims.claims import Result, check_claims, evaluate, tolerance_of
-from ftcc.groundside.claims.metrics import METRICS, check_expression, evaluated
+from ftcc.groundside.claims.expressions import check_expression, evaluated
+from ftcc.groundside.claims.metrics import METRICS
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
 

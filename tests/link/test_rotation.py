@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ftcc.groundside import metrics
+from ftcc.groundside.claims import expressions
 from ftcc.link.rotation import nearest_turn, wrapped
 
 DEGREE = math.radians(1.0)
@@ -50,14 +50,14 @@ def test_the_nearest_turn_lets_a_curve_go_on():
 
 def test_recordings_are_judged_by_the_same_angles():
     angles = np.array([*np.linspace(-12.0, 12.0, 193), math.pi, -math.pi, math.nan, math.inf, -math.inf])
-    assert np.array_equal(metrics.wrapped(angles), [wrapped(float(angle)) for angle in angles], equal_nan=True)
+    assert np.array_equal(expressions.wrapped(angles), [wrapped(float(angle)) for angle in angles], equal_nan=True)
 
 
 def test_a_curve_without_jumps_passes_over_what_is_not_known():
     told = np.array([3.0, 3.1, math.nan, -3.1, -3.0])
-    drawn = metrics.unwrapped(told)
+    drawn = expressions.unwrapped(told)
     assert drawn[[0, 1, 3, 4]] == pytest.approx([3.0, 3.1, 2.0 * math.pi - 3.1, 2.0 * math.pi - 3.0])
     assert math.isnan(drawn[2])
-    assert metrics.unwrapped(np.array([-170.0, -175.0]), 360.0, np.array([math.nan, 180.0])) == pytest.approx(
+    assert expressions.unwrapped(np.array([-170.0, -175.0]), 360.0, np.array([math.nan, 180.0])) == pytest.approx(
         [190, 185]
     )

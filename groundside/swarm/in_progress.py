@@ -1,0 +1,193 @@
+"""A flight in progress: its events, its pictures, its pace, commands from the command line, and its verdict."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ftcc.groundside.dashboard import Event, Feed, Pace
+from ftcc.groundside.results import Run, RunError
+from ftcc.groundside.swarm.launcher import Swarm
+from ftcc.groundside.swarm.monitor import Monitor
+from ftcc.groundside.swarm.pacing import Pacing
+from ftcc.groundside.verdict import VERDICT_FILE, judge
+from ftcc.link.recording import EventLog
+
+if TYPE_CHECKING:
+    from ftcc.groundside.scenario import Mission
+
+__all__ = ["FlightInProgress", "Progress"]
+
+Progress = Callable[[float, Pace], None]
+"""Called with the simulated time (s) that a flight has come to, and its pace."""
+
+_REFRESH = 0.1
+"""Least period of the dashboard and of progress, wall s."""
+
+
+@dataclass
+class FlightInProgress:
+    """A flight with all that belongs to it, and what is done with it now and then."""
+
+    mission: Mission
+    swarm: Swarm
+    station: Monitor
+    dashboard: Any
+    feed: Feed | None
+    log: EventLog
+    say: Callable[[Event], None]
+    pacing: Pacing
+    next_event: int = 0
+    refreshed: float = 0.0
+
+    def note(self, event: Event) -> None:
+        """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
+        stamped = event if event.t >= 0.0 else replace(event, t=self.station.t)
+        more = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
+        self._write(stamped, more)
+        self.station.note(stamped)
+        self.say(stamped)
+
+    def _write(self, event: Event, more: dict[str, str]) -> None:
+        fine = not self.log.trouble
+        self.log.write(event.t, event.text, event.uav, event.severity, **more)
+        if fine and self.log.trouble:
+            self.note(Event(event.t, "error", f"events are not logged any further: {self.log.trouble}"))
+
+    def scheduled_events(self) -> None:
+        """Note the scenario's own events as their time comes."""
+        while self.next_event < len(self.mission.events) and self.mission.events[self.next_event][0] <= self.station.t:
+            t, uav, severity, text = self.mission.events[self.next_event]
+            self.note(Event(t, severity, text, uav))
+            self.next_event += 1
+
+    def watch_pace(self) -> None:
+        """Measure how fast the swarm flies, and say where it is too slow."""
+        flown = round(self.station.t / self.mission.timing.period) * len(self.mission.vehicles)
+        text = self.pacing.look(
+            time.monotonic(),
+            self.station.t,
+            (self.station.late, flown),
+            [(child.name, child.process.pid or 0, child.kind) for child in self.swarm.flying],
+            self.dashboard.pids if self.dashboard is not None else [],
+        )
+        if text:
+            self.note(Event(-1.0, "warning", text))
+
+    def refresh(self, progress: Progress) -> None:
+        """Draw the swarm, at most ten times a second."""
+        if time.monotonic() - self.refreshed < _REFRESH:
+            return
+        self.refreshed = time.monotonic()
+        if trouble := self.station.take_trouble():
+            self.note(Event(-1.0, "error", trouble))
+        self.scheduled_events()
+        if self.swarm.flow.state == "flying" and self.station.t > 0.0:
+            self.watch_pace()
+        progress(self.station.t, self.pacing.pace)
+        # The first picture sets the scale: it waits for everybody, but not for ever.
+        if not (self.station.complete or self.station.t > 1.0):
+            return
+        snapshot = replace(self.station.snapshot(), pace=self.pacing.pace)
+        if self.feed is not None:
+            self.feed.offer(snapshot)
+        if self.dashboard is not None:
+            self.dashboard.log(snapshot)
+            for problem in self.dashboard.take_problems():
+                self.note(problem)
+
+    def conclude(self) -> None:
+        """Say how the flight went, in its log, its folder and the dashboard, where anything was recorded."""
+        run = Run(self.swarm.folder)
+        try:
+            verdict = judge(run, self.mission, run.lost)
+        except RunError:
+            # What has been recorded cannot be read, or is nothing: the log says why.
+            return
+        except OSError as error:
+            what = (
+                f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` does it once there is room"
+            )
+            self.note(Event(-1.0, "error", f"the processes' recordings are {what}"))
+            return
+        self.swarm.outcome.verdict = verdict
+        try:
+            (run.path / VERDICT_FILE).write_text(verdict.dumps(), encoding="utf-8")
+        except OSError as error:
+            self.note(Event(-1.0, "error", f"{VERDICT_FILE} could not be written: {error.strerror}"))
+        self.log.write(run.end, verdict.text, severity=verdict.severity)
+        self.station.note(Event(run.end, verdict.severity, verdict.text))
+        if not self.station.complete:
+            return
+        snapshot = self.station.snapshot()
+        if self.feed is not None:
+            self.feed.offer(snapshot)
+        if self.dashboard is not None:
+            self.dashboard.log(snapshot)
+
+    def obey(self, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
+        """A command from the control socket.
+
+        Raises
+        ------
+        ValueError
+            With what is wrong with it.
+        """
+        flow, text = self.swarm.flow, ""
+        match command:
+            case "status":
+                t = flow.tick * flow.period if flow.state == "held" else self.station.t
+                pace = self.pacing.pace
+                reached = None if math.isnan(pace.factor) else pace.factor
+                speeds = {"speed": pace.asked, "factor": reached, "limit": pace.limit, "advice": pace.advice}
+                return {"state": flow.state, "t": t, **speeds}
+            case "stop":
+                self.swarm.stop()
+            case "pause":
+                flow.pause()
+                text = "paused"
+            case "step":
+                flow.step(max(1, int(arguments["ticks"])))
+            case "resume":
+                flow.resume()
+                self.pacing.restart()
+                text = "resumed"
+            case "speed":
+                factor = arguments["factor"]
+                flow.set_speed(math.inf if factor is None else float(factor))
+                self.pacing.ask(flow.speed)
+                text = "speed max" if factor is None else f"speed {flow.speed:g}"
+            case _:
+                raise ValueError(f"unknown command {command!r}")
+        if text:
+            self.note(Event(-1.0, "info", text, who="command line", outcome="accepted"))
+        return None
+
+    def log_the_end(self, flown_for: float) -> None:
+        """How fast the swarm flew, ``flown_for`` seconds of wall time in all, as the last entry of the log."""
+        outcome, pace = self.swarm.outcome, self.pacing.pace
+        if self.station.strangers:
+            self.log.write(self.station.t, f"dropped {self.station.strangers} datagrams of strangers at the station")
+        self.log.write(
+            self.station.t,
+            f"flight over: {outcome.late} of {outcome.ticks} ticks late",
+            late=outcome.late,
+            ticks=outcome.ticks,
+            factor=round(outcome.flown * self.mission.timing.period / flown_for, 3) if flown_for else None,
+            asked=pace.asked,
+            limit=pace.limit,
+            advice=pace.advice,
+            late_of={str(uav): state.late for uav, state in self.station.snapshot().uavs.items()},
+        )
+        self.log.close()
+
+    def close(self) -> None:
+        """Close whatever shows or hears the swarm."""
+        self.station.close()
+        if self.feed:
+            self.feed.close()
+        if self.dashboard:
+            self.dashboard.close()
