@@ -37,8 +37,8 @@ from ftcc.link.actuators import ACTUATORS, SLOT, encode_command
 from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import compiled, instantiate, refusal, uncompile, width
-from ftcc.link.happenings import Happenings, drained, new_happenings, note
-from ftcc.link.modes import HOLD, MISSION
+from ftcc.link.events import EventList, drain_events, new_events, note
+from ftcc.link.flight_modes import HOLD, MISSION
 from ftcc.link.timing import Timing
 
 __all__ = [
@@ -115,18 +115,18 @@ class Autopilots(NamedTuple):
     """(k,): see `modes`."""
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
-    happenings: Happenings
+    events: EventList
     """What is to be told, see `told`."""
 
 
 _PASSED, _HELD = 1, 2
-"""Kinds of happenings: a trigger fired (its number); the climb rate is held at its limit (1: up, 0: down)."""
+"""Kinds of events: a trigger fired (its number); the climb rate is held at its limit (1: up, 0: down)."""
 
 
 def told(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) -> list[tuple[int, int, str, str]]:
     """What the autopilots noted since they were asked last: time us, UAV, severity, text."""
     events = []
-    for at_us, i, kind, number in drained(autopilots.happenings):
+    for at_us, i, kind, number in drain_events(autopilots.events):
         profile = specs[i].profile
         assert profile is not None
         if kind == _PASSED:
@@ -256,7 +256,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
             course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
             mode=np.full(k, MISSION),
             held_us=np.zeros(k, np.int64),
-            happenings=new_happenings(),
+            events=new_events(),
         ),
         inbox,
     )
@@ -306,9 +306,9 @@ def lead(autopilots, inbox, i, now_us, period_us):
         clamped, fired = state[CLAMPED], state[FIRED]
         refer(autopilots.profile[i], commands, triggers, state, reference, seen, clock, period_us)
         if state[FIRED] > fired:
-            note(autopilots.happenings, now_us, i, _PASSED, int(fired))
+            note(autopilots.events, now_us, i, _PASSED, int(fired))
         if state[CLAMPED] > clamped:
-            note(autopilots.happenings, now_us, i, _HELD, int(reference[4] > 0.0))
+            note(autopilots.events, now_us, i, _HELD, int(reference[4] > 0.0))
     target = autopilots.target[i]
     target[0] = now_us / 1e6
     target[1], target[2], target[3] = reference[0], autopilots.offset[i], reference[3]

@@ -194,7 +194,7 @@ def something_to_do(group, timing, now_us):
         to_do |= WRITE
     if now_us // timing.period_us % ticks_a_second(timing.period_us) == 0:
         to_do |= SECOND
-    if group.autopilots.happenings.used[0] > 0:
+    if group.autopilots.events.used[0] > 0:
         to_do |= NOTE
     if group.given_up[0] > 0 or group.unsendable[0] > 0:
         to_do |= GIVE_UP

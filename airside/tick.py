@@ -18,7 +18,7 @@ from ftcc.link.actuators import decode_command
 from ftcc.link.channel import hear as hear_inbox
 from ftcc.link.compiled import compiled, copy, fields, store, width
 from ftcc.link.exchange import deliver, post
-from ftcc.link.modes import HOLD
+from ftcc.link.flight_modes import HOLD
 
 __all__ = ["SWEEPS", "announce", "anticipate", "control", "hear", "refer", "sense", "tell"]
 

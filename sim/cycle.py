@@ -189,7 +189,7 @@ def sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
     """
     actuate(fleet, i, now_us / 1e6)
     truth(fleet, i, now_us / 1e6, true)
-    watch(fleet.zones, fleet.entered, fleet.happenings, i, now_us, true[X], true[Z])
+    watch(fleet.zones, fleet.entered, fleet.events, i, now_us, true[X], true[Z])
     measure(fleet, i, tick, seed, true, seen)
     seen[Z] -= fleet.datum[i]
     encode_state(seen, state)

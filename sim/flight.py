@@ -260,7 +260,7 @@ def ask_again(group, wanted, now):
 @compiled_within
 def something_to_do(group, timing):
     """Whether Python has something to do after this tick: rows to write, losses and events to tell, truth to send."""
-    if group.fleet.happenings.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
+    if group.fleet.events.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
         return True
     if group.tick[0] % ticks_a_second(timing.period_us) == 0:
         return True

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftcc.link.compiled import compiled
-from ftcc.link.happenings import note
+from ftcc.link.events import note
 
 __all__ = ["ENTERED", "Obstacle", "clearance", "entered_text", "watch", "zones_of"]
 
@@ -43,12 +43,12 @@ def clearance(zones, x, z):
 
 
 @compiled
-def watch(zones, entered, happenings, i, now_us, x, z):
+def watch(zones, entered, events, i, now_us, x, z):
     """Note when vehicle ``i`` enters a zone for the first time; ``entered`` (k, n) keeps which ones it did."""
     for n in range(zones.shape[0]):
         if entered[i, n] == 0 and zones[n, 0] < x < zones[n, 1] and z < zones[n, 2]:
             entered[i, n] = 1
-            note(happenings, now_us, i, ENTERED, n + 1)
+            note(events, now_us, i, ENTERED, n + 1)
 
 
 def entered_text(uav: int, number: int) -> str:

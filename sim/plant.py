@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import compiled, compiled_within, copy, fill
-from ftcc.link.happenings import Happenings
+from ftcc.link.events import EventList
 from ftcc.link.philox import GUST, gaussian_pair, philox
 
 __all__ = [
@@ -240,7 +240,7 @@ class Fleet(NamedTuple):
     """(n, 3): the obstacles, see `obstacles.Obstacle`."""
     entered: NDArray[np.int64]
     """(k, n): 1 once a vehicle has entered the zone."""
-    happenings: Happenings
+    events: EventList
     """What is to be told; the kinds are those of `obstacles`."""
     autothrottle: NDArray[np.float64]
     """(k, 4): see `Autothrottle`, then the thrust that it asks for at present, N."""

@@ -15,16 +15,16 @@ import numpy as np
 
 from ftcc.link.actuators import ACTUATORS, SLOT, by_slot, in_slots, unit_of
 from ftcc.link.compiled import entry_of
+from ftcc.link.events import drain_events
 from ftcc.link.failures import Failure, failure_answer, read_failure
 from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
-from ftcc.link.happenings import drained
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, Endpoint, dialect, ending_message, ends, float_array
 from ftcc.link.process import Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, Recorder, is_full, part_path
 from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, HELD, WORK
 from ftcc.link.wire import connect, keep_sent, send_again, split
-from ftcc.sim.failures import faults_of, inject
+from ftcc.sim.faults import faults_of, inject
 from ftcc.sim.group import VehicleGroup, build_group
 from ftcc.sim.obstacles import entered_text
 from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS
@@ -222,8 +222,8 @@ class Vehicles:
             self.recorder.write()
         if tick % self.timing.report_every == 0:
             self.recorder.write_if_due()
-        if self.group.fleet.happenings.used[0]:
-            for at_us, i, _, number in drained(self.group.fleet.happenings):
+        if self.group.fleet.events.used[0]:
+            for at_us, i, _, number in drain_events(self.group.fleet.events):
                 uav = self.specs[i].uav
                 self.gate.tell(Said("warning", entered_text(uav, number), uav, at_us))
         if self.group.lost[0]:

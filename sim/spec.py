@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
-from ftcc.link.happenings import new_happenings
-from ftcc.sim.failures import SPARE, inject
+from ftcc.link.events import new_events
+from ftcc.sim.faults import SPARE, inject
 from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.obstacles import Obstacle, zones_of
 from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Fault, Fleet, Guards, Gust
@@ -147,7 +147,7 @@ def build(specs: Sequence[VehicleSpec]) -> Fleet:
         travel=np.array([spec.travel for spec in specs], np.float64),
         zones=zones_of(specs[0].obstacles),
         entered=np.zeros((k, len(specs[0].obstacles)), np.int64),
-        happenings=new_happenings(),
+        events=new_events(),
         autothrottle=np.array([(*spec.autothrottle, spec.autothrottle.thrust) for spec in specs], np.float64),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
     )

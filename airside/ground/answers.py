@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ftcc.link.mavlink import dialect
 
 if TYPE_CHECKING:
-    from ftcc.link.ground import Peer
+    from ftcc.link.gcs_sockets import Peer
 
 __all__ = ["ACCEPTED", "BUSY", "DENIED", "UNSUPPORTED", "Answer", "Request", "degrees_of", "read_request", "whole"]
 

@@ -11,8 +11,8 @@ from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.ground.motion import change_altitude, change_speed, reposition
 from ftcc.airside.ground.schedule import SLOWEST
 from ftcc.airside.ground.streams import requested
+from ftcc.link.flight_modes import HOLD, MISSION, mode_of
 from ftcc.link.mavlink import dialect
-from ftcc.link.modes import HOLD, MISSION, mode_of
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

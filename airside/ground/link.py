@@ -21,7 +21,7 @@ from ftcc.airside.ground.seat import Seat
 from ftcc.airside.ground.signatures import Signatures
 from ftcc.airside.ground.streams import LOGGED, STREAMS, heartbeat, rates_of
 from ftcc.link.gate import LauncherGoneError
-from ftcc.link.ground import GroundSocket, Peer
+from ftcc.link.gcs_sockets import GcsSocket, Peer
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, dialect, status_text
 
 __all__ = ["GroundLink"]
@@ -50,9 +50,9 @@ class GroundLink:
         self.signatures = Signatures(seat, self.system)
         signing = self.signatures.signing
         station = (LOOPBACK, setting.station)
-        self._station = GroundSocket(self.system, AUTOPILOT, ports.telemetry, station, signing)
-        self._callers = GroundSocket(self.system, AUTOPILOT, ports.ground, None, signing)
-        listeners = [GroundSocket(self.system, AUTOPILOT, 0, to, signing) for to in setting.listeners]
+        self._station = GcsSocket(self.system, AUTOPILOT, ports.telemetry, station, signing)
+        self._callers = GcsSocket(self.system, AUTOPILOT, ports.ground, None, signing)
+        listeners = [GcsSocket(self.system, AUTOPILOT, 0, to, signing) for to in setting.listeners]
         self.sockets = (self._station, self._callers, *listeners)
         """To be listened to."""
         self._rates = rates_of(seat, station=False)
@@ -190,11 +190,11 @@ class GroundLink:
 
     # From the ground.
 
-    def listen(self, socket: GroundSocket) -> None:
+    def listen(self, socket: GcsSocket) -> None:
         """Answer what has come by ``socket``; what is for other systems is left alone."""
         self._survive("reading", partial(self._listen, socket))
 
-    def _listen(self, socket: GroundSocket) -> None:
+    def _listen(self, socket: GcsSocket) -> None:
         for peer, message in socket.receive():
             self._welcome(peer)
             kind = message.get_type()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, Answer
 from ftcc.airside.references.profiles import release_from_ground
-from ftcc.link.modes import MISSION, NAMES, OFFBOARD
+from ftcc.link.flight_modes import MISSION, NAMES, OFFBOARD
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

@@ -10,8 +10,8 @@ from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, Answer, Request,
 from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.model import level_deflections
 from ftcc.airside.references.profiles import climb_of_step, command_from_ground
+from ftcc.link.flight_modes import HOLD
 from ftcc.link.mavlink import as_typed, dialect
-from ftcc.link.modes import HOLD
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

@@ -11,8 +11,8 @@ from ftcc.airside.ground.answers import ACCEPTED
 from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.ground.motion import lead, read_target
 from ftcc.airside.references import of_plant
+from ftcc.link.flight_modes import HOLD, OFFBOARD
 from ftcc.link.mavlink import dialect
-from ftcc.link.modes import HOLD, OFFBOARD
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink

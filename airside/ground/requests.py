@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ftcc.airside.ground.answers import ACCEPTED, read_request
 from ftcc.airside.ground.modes import set_mode
 from ftcc.airside.ground.parameters import RefusedError
+from ftcc.link.flight_modes import mode_of
 from ftcc.link.mavlink import dialect
-from ftcc.link.modes import mode_of
 
 if TYPE_CHECKING:
     from ftcc.airside.ground.link import GroundLink
-    from ftcc.link.ground import Peer
+    from ftcc.link.gcs_sockets import Peer
 
 __all__ = ["MESSAGES", "Message"]
 

@@ -11,8 +11,8 @@ from ftcc.airside.ground.answers import whole
 from ftcc.airside.ground.seat import Seat
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
+from ftcc.link.flight_modes import custom_mode
 from ftcc.link.mavlink import dialect, float_array
-from ftcc.link.modes import custom_mode
 from ftcc.link.rotation import body_attitude
 
 __all__ = [

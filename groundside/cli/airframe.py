@@ -13,7 +13,7 @@ from ftcc.groundside.cli.common import fail, terminal
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ftcc.sim.modes import Mode
+    from ftcc.sim.linear_modes import Mode
     from ftcc.sim.trim import Trim
 
 __all__ = ["airframe"]
@@ -39,7 +39,7 @@ def airframe(
     from ftcc.groundside.scenario import load_airframe
     from ftcc.groundside.schema import AirframeSheet
     from ftcc.sim.airframe import Airframe, scaled
-    from ftcc.sim.modes import modes
+    from ftcc.sim.linear_modes import modes
     from ftcc.sim.trim import TrimError, trim
 
     speeds = airspeed or [18.0, 22.0, 25.0, 30.0, 35.0]

@@ -59,7 +59,7 @@ def _pack(text: str, uavs: int) -> int:
 
 def _listeners(given: list[str] | None) -> tuple[Address, ...]:
     """Addresses of ground stations."""
-    from ftcc.link.ground import LISTENERS
+    from ftcc.link.gcs_sockets import LISTENERS
 
     if given is None:
         return LISTENERS

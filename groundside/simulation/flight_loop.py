@@ -213,7 +213,7 @@ def _ideal_tick(world, timing, n):
             continue
         fleet, true = world.fleet, world.true[i]
         _truth(fleet, i, now / 1e6, true)
-        watch(fleet.zones, fleet.entered, fleet.happenings, i, now, true[X], true[Z])
+        watch(fleet.zones, fleet.entered, fleet.events, i, now, true[X], true[Z])
         _measure(fleet, i, n, timing.seed, true, world.seen)
         own = autopilots.own[i]
         own[0] = now / 1e6

@@ -30,7 +30,7 @@ from ftcc.groundside.verdict import VERDICT_FILE, Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.link.channel import LINK_REPORT
 from ftcc.link.compiled import instantiate, uncompile
-from ftcc.link.happenings import drained
+from ftcc.link.events import drain_events
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
 from ftcc.sim.obstacles import clearance, entered_text, zones_of
 from ftcc.sim.plant import LOST, TRUTH
@@ -299,7 +299,7 @@ def _part(mission: Mission, recording: Any, begin: int, end: int, events: list[t
 
 def _happened(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:
     """What vehicles and autopilots have noted: time s, UAV, severity, text."""
-    entries = [(at, mission.uavs[i], number) for at, i, _, number in drained(fleet.happenings)]
+    entries = [(at, mission.uavs[i], number) for at, i, _, number in drain_events(fleet.events)]
     events = [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in entries]
     events += told(autopilots, mission.autopilots)
     return [(at / 1e6, uav, severity, text) for at, uav, severity, text in sorted(events)]

@@ -23,7 +23,7 @@ from ftcc.groundside.swarm.pace import Setup, usable_cores
 from ftcc.groundside.swarm.pacing import Pacing
 from ftcc.groundside.swarm.registry import Card, Control, Entry
 from ftcc.link.addresses import Address
-from ftcc.link.ground import LISTENERS
+from ftcc.link.gcs_sockets import LISTENERS
 from ftcc.link.ports import PortBlock
 from ftcc.link.recording import EventLog
 

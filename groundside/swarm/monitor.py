@@ -15,8 +15,8 @@ from typing import Any
 from ftcc.airside.ground import LINK_FIELDS
 from ftcc.groundside.dashboard import Event, LinkState, Snapshot, UavState
 from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
-from ftcc.link.modes import NAMES as MODES
-from ftcc.link.modes import mode_of
+from ftcc.link.flight_modes import NAMES as MODES
+from ftcc.link.flight_modes import mode_of
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
 from ftcc.sim.process import truth_array

@@ -16,8 +16,8 @@ from typing import Self
 
 from ftcc.groundside.swarm.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
 from ftcc.link.failures import KINDS, UNITS
+from ftcc.link.flight_modes import code_of, mode_called
 from ftcc.link.mavlink import AUTOPILOT, dialect
-from ftcc.link.modes import code_of, mode_called
 
 __all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState"]
 

@@ -17,8 +17,8 @@ from ftcc.groundside.dashboard.snapshot import LinkState
 from ftcc.groundside.swarm.monitor import Monitor
 from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
 from ftcc.link.codec import Codec, dialect
+from ftcc.link.flight_modes import MISSION, custom_mode
 from ftcc.link.mavlink import float_array
-from ftcc.link.modes import MISSION, custom_mode
 from ftcc.link.signing import Signing
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find

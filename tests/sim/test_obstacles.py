@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftcc.link.happenings import drained, new_happenings, note
+from ftcc.link.events import drain_events, new_events, note
 from ftcc.sim.obstacles import ENTERED, Obstacle, clearance, watch, zones_of
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.spec import build
@@ -28,7 +28,7 @@ def test_without_obstacles_clearance_is_the_altitude() -> None:
 
 
 def test_only_the_first_entry_into_a_zone_is_told() -> None:
-    entered, happenings = np.zeros((2, 2), np.int64), new_happenings()
+    entered, events = np.zeros((2, 2), np.int64), new_events()
     for now, x, z in (
         (0, 2400.0, 400.0),
         (1, 2600.0, 431.0),
@@ -36,16 +36,16 @@ def test_only_the_first_entry_into_a_zone_is_told() -> None:
         (3, 2800.0, 431.0),
         (4, 4100.0, 429.0),
     ):
-        watch(ZONES, entered, happenings, 1, now, x, z)
-    assert drained(happenings) == [(2, 1, ENTERED, 1), (4, 1, ENTERED, 2)]
-    assert drained(happenings) == []
+        watch(ZONES, entered, events, 1, now, x, z)
+    assert drain_events(events) == [(2, 1, ENTERED, 1), (4, 1, ENTERED, 2)]
+    assert drain_events(events) == []
 
 
 def test_a_list_that_nobody_empties_keeps_what_came_first() -> None:
-    happenings = new_happenings()
+    events = new_events()
     for now in range(1000):
-        note(happenings, now, 0, ENTERED, 1)
-    rows = drained(happenings)
+        note(events, now, 0, ENTERED, 1)
+    rows = drain_events(events)
     assert [row[0] for row in rows] == list(range(len(rows)))
     assert len(rows) < 1000
 
@@ -55,4 +55,4 @@ def test_a_vehicle_in_a_zone_is_noted_in_its_tick() -> None:
     fleet = build([vehicle(1, obstacles=HILLS), vehicle(2, obstacles=HILLS, initial=low)])
     for i in range(2):
         cycle_of("longitudinal").sense(fleet, i, 7, 70_000, 1, np.zeros(13), np.zeros(13), np.zeros(13), np.zeros(4))
-    assert drained(fleet.happenings) == [(70_000, 1, ENTERED, 1)]
+    assert drain_events(fleet.events) == [(70_000, 1, ENTERED, 1)]

@@ -22,7 +22,7 @@ NEAR = (
 """Everything within 12 s: detection, a climb held at its limit, three followers and a leader in the zone."""
 
 
-def happenings(folder: Path) -> set[tuple[object, ...]]:
+def zone_and_leader_events(folder: Path) -> set[tuple[object, ...]]:
     words = ("entered obstacle zone", "leader commanded", "held at its limit")
     found = ((event["t"], event["uav"], event["severity"], str(event["text"])) for event in events(folder))
     return {event for event in found if any(word in event[3] for word in words)}
@@ -35,9 +35,9 @@ def test_detection_climb_limit_and_entries_equal_the_simulation(fly: Callable[..
     folder = tmp_path / "simulated"
     simulate(resolve(load("finite_time_containment", settings=NEAR, duration=12.0)), folder)
     assert same_flight(flight.folder, folder)
-    told = happenings(folder)
-    assert {(uav, text) for _, uav, severity, text in told if severity == "warning"} == {
+    noted = zone_and_leader_events(folder)
+    assert {(uav, text) for _, uav, severity, text in noted if severity == "warning"} == {
         *((uav, f"UAV {uav} entered obstacle zone 1") for uav in (2, 3, 4, 6)),
         *((uav, "leader's climb rate held at its limit of 4.71 m/s") for uav in (5, 6)),
     }
-    assert happenings(flight.folder) == told
+    assert zone_and_leader_events(flight.folder) == noted

@@ -11,7 +11,7 @@ import pytest
 from ftcc.airside.ground.requests import MESSAGES
 from ftcc.airside.ground.streams import STREAMS
 from ftcc.link.codec import Codec
-from ftcc.link.modes import HOLD, OFFBOARD
+from ftcc.link.flight_modes import HOLD, OFFBOARD
 from tests.airside.ground.in_flight import LEVEL, M, ask, flying, said
 
 EPOCH = 1_700_000_000_000_000

@@ -21,8 +21,8 @@ from ftcc.groundside.swarm.registry import Card, Entry
 from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import Codec
 from ftcc.link.failures import failure_answer, read_failure
+from ftcc.link.flight_modes import HOLD, MISSION
 from ftcc.link.mavlink import LOOPBACK
-from ftcc.link.modes import HOLD, MISSION
 from tests.airside.autopilot_bench import Bench
 from tests.airside.ground.in_flight import LEVEL, M, ask, said
 from tests.pymavlink_wire import state_messages

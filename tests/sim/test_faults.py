@@ -11,7 +11,7 @@ from ftcc.airside.flight_path import Own, decode_state
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.link.failures import AIRFRAME_SIZES, KINDS, UNITS, Failure, meaning_of
 from ftcc.sim import navigation
-from ftcc.sim.failures import SPARE, faults_of, inject
+from ftcc.sim.faults import SPARE, faults_of, inject
 from ftcc.sim.navigation import ATTITUDE, POSITION, NavigationFault
 from ftcc.sim.plant import INTERMITTENT, STUCK, Fault, Fleet
 from ftcc.sim.plants import cycle_of

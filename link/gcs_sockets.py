@@ -12,7 +12,7 @@ from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.signing import Signing
 
-__all__ = ["LISTENERS", "GroundSocket", "Peer"]
+__all__ = ["LISTENERS", "GcsSocket", "Peer"]
 
 LISTENERS: tuple[Address, ...] = ((LOOPBACK, 14550), (LOOPBACK, 14540))
 """Where ground stations and offboard programs listen by custom."""
@@ -91,7 +91,7 @@ class Peer:
             return  # A full buffer, or no way there at present.
 
 
-class GroundSocket:
+class GcsSocket:
     """One UDP socket towards the ground.
 
     Parameters

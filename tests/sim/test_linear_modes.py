@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftcc.sim.airframe import Airframe, scaled
-from ftcc.sim.modes import STATES, linearize, modes
+from ftcc.sim.linear_modes import STATES, linearize, modes
 from tests.swarm import AIRFRAME
 
 HIGHER = scaled(AIRFRAME, {"all": 1.2, "CLde": 1.0})
