@@ -17,7 +17,7 @@ from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import decode_command
 from ftcc.link.channel import hear as hear_inbox
 from ftcc.link.compiled import compiled, copy, fields, store, width
-from ftcc.link.exchange import deliver, post
+from ftcc.link.exchange import deliver_due, post
 from ftcc.link.flight_modes import HOLD
 
 __all__ = ["SWEEPS", "announce", "anticipate", "control", "hear", "refer", "sense", "tell"]
@@ -94,7 +94,7 @@ def sense(autopilots, i, state, reported, now_us):
 @compiled
 def hear(exchange, inbox, events, timing, i, now_us):
     """Take the records that are due for UAV ``i`` through the channels of its in-edges."""
-    deliver(exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
+    deliver_due(exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
     hear_inbox(inbox, i, now_us)
 
 

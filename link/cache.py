@@ -34,10 +34,10 @@ _KEPT_CACHES = 6
 _PACKAGES = ("link", "sim", "airside")
 _LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
 """What the contents depend on beside the sources: pymavlink gives the layouts of messages."""
-_LOOK, _SILENT, _PATIENCE = 0.02, 3.0, 30.0
+_POLL, _SILENT, _TIMEOUT = 0.02, 3.0, 30.0
 """A process that waits for another one that writes looks so often, tells so after so long, and then gives up, s."""
 
-_told: set[str] = set()
+_warned: set[str] = set()
 """Warnings that this process has given."""
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -61,19 +61,19 @@ def alone(place: Path) -> Iterator[None]:
     place.mkdir(parents=True, exist_ok=True)
     with (place / ".writing").open("a+", encoding="ascii") as file:
         began = time.monotonic()
-        told = False
+        reported = False
         while True:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
                 waited = time.monotonic() - began
-            if waited > _PATIENCE:
+            if waited > _TIMEOUT:
                 raise CacheBusyError(f"process {_holder(file)} has held {file.name} for {waited:.0f} s")
-            if waited > _SILENT and not told:
+            if waited > _SILENT and not reported:
                 print(f"ftcc: waiting for process {_holder(file)}, which writes into {place}", file=sys.stderr)
-                told = True
-            time.sleep(_LOOK)
+                reported = True
+            time.sleep(_POLL)
         file.truncate(0)
         file.write(str(os.getpid()))
         file.flush()
@@ -129,8 +129,8 @@ def not_kept(error: OSError) -> None:
     """Warn, once for each reason, that the cache takes nothing: what it should hold is made anew at every start."""
     why = error.strerror or error
     text = f"compiled code cannot be kept, each start compiles anew: {why}; set FTCC_CACHE_DIR to a folder with room"
-    if text not in _told:
-        _told.add(text)
+    if text not in _warned:
+        _warned.add(text)
         warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 

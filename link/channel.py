@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ftcc.link.compiled import compiled, copy
 from ftcc.link.philox import CHANNEL, philox, uniform
 
-__all__ = ["LINK_REPORT", "SLOTS", "Channel", "Edge", "Inbox", "admit", "hear", "new_inbox", "report_link"]
+__all__ = ["LINK_REPORT", "SLOTS", "Channel", "Edge", "Inbox", "deliver", "hear", "new_inbox", "report_link"]
 
 SLOTS = 32
 """Records that can be under way on one edge at a time."""
@@ -121,7 +121,7 @@ def _take(inbox, i, edge, stamp, values):
 
 
 @compiled
-def admit(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed):
+def deliver(inbox, i, edge, sequence, stamp, radio_on, values, latency, now, seed):
     """Pass one record through the channel of in-edge ``edge`` of UAV ``i`` (indices) and, if it survives, keep it.
 
     To be called in order of sequence, at the first tick ``now`` >= stamp + latency (all in us). ``radio_on`` is false

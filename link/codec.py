@@ -47,7 +47,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             self.refusal = Refusal("other key", srcSystem, srcComponent)
         else:
             stream = (block[0], srcSystem, srcComponent)
-            self.refusal = self.own_signing.admit(stream, int.from_bytes(block[1:7], "little"))
+            self.refusal = self.own_signing.accept(stream, int.from_bytes(block[1:7], "little"))
         return self.refusal is None
 
 

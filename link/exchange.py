@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.link.channel import Edge, admit
+from ftcc.link.channel import Edge, deliver
 from ftcc.link.compiled import compiled, copy
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
     "TransmissionError",
     "append",
     "begin",
-    "deliver",
+    "deliver_due",
     "new_exchange",
     "new_transmission",
     "newest_slot",
@@ -116,7 +116,7 @@ def newest_slot(exchange, row):
 
 
 @compiled
-def deliver(exchange, inbox, radio_on, i, now_us, latency_us, seed):
+def deliver_due(exchange, inbox, radio_on, i, now_us, latency_us, seed):
     """Pass what is due for UAV ``i`` at ``now_us`` through the channels of its in-edges into its inbox.
 
     ``radio_on`` tells whether its own radio is on; a radio that is off neither hears nor is heard.
@@ -133,7 +133,7 @@ def deliver(exchange, inbox, radio_on, i, now_us, latency_us, seed):
                     break
                 both_on = exchange.radio_on[row, slot] == 1 and radio_on == 1
                 values = exchange.values[row, slot]
-                admit(inbox, i, edge, sequence, stamp, both_on, values, latency_us, now_us, seed)
+                deliver(inbox, i, edge, sequence, stamp, both_on, values, latency_us, now_us, seed)
             sequence += 1
 
 

@@ -237,7 +237,7 @@ class Failure:
 
 def failure_messages(uav: int, meaning: Meaning, instance: int, at_us: int, sizes: Sequence[float]) -> tuple[Any, Any]:
     """What an autopilot tells its vehicle: the sizes and the simulated time (0 = at once), then the command."""
-    told = float_array(at_us, _SIZES_ARRAY, sizes)
+    sizes_array = float_array(at_us, _SIZES_ARRAY, sizes)
     command = dialect.MAVLink_command_long_message(
         uav,
         SIMULATOR,
@@ -251,22 +251,22 @@ def failure_messages(uav: int, meaning: Meaning, instance: int, at_us: int, size
         0.0,
         0.0,
     )
-    return told, command
+    return sizes_array, command
 
 
 def read_failure(messages: Sequence[Any]) -> tuple[Failure | None, int]:
     """The inverse of `failure_messages`, from the beginning of ``messages``: the failure, and its time in us."""
     if len(messages) < 2:
         return None, 0
-    told, command = messages[0], messages[1]
-    if told.get_type() != "DEBUG_FLOAT_ARRAY" or command.get_type() != "COMMAND_LONG":
+    sizes_array, command = messages[0], messages[1]
+    if sizes_array.get_type() != "DEBUG_FLOAT_ARRAY" or command.get_type() != "COMMAND_LONG":
         return None, 0
     meaning = meaning_of(command.param1, command.param2, command.param3)
-    if told.name.rstrip("\0") != _SIZES_ARRAY or command.command != dialect.MAV_CMD_INJECT_FAILURE or meaning is None:
+    if sizes_array.name.rstrip("\0") != _SIZES_ARRAY or command.command != dialect.MAV_CMD_INJECT_FAILURE or meaning is None:
         return None, 0
     names = [size.name for size in AIRFRAME_SIZES]
-    sizes = dict(zip(names, map(as_typed, told.data), strict=False))
-    return Failure(meaning, int(command.param3), sizes), int(told.time_usec)
+    sizes = dict(zip(names, map(as_typed, sizes_array.data), strict=False))
+    return Failure(meaning, int(command.param3), sizes), int(sizes_array.time_usec)
 
 
 def failure_answer(uav: int, result: int, at_us: int) -> Any:

@@ -144,8 +144,8 @@ def _log(path: Path) -> Iterator[None]:
         faulthandler.disable()
 
 
-def process_main(name: str, pipe: Connection, setting: Setting, run: Callable[..., None], specs: Any) -> None:
-    """Body of every child process: ``run(specs, setting, gate)`` under a log; exit code 1 if it raises.
+def process_main(name: str, pipe: Connection, setting: Setting, main: Callable[..., None], specs: Any) -> None:
+    """Body of every child process: ``main(specs, setting, gate)`` under a log; exit code 1 if it raises.
 
     Ctrl-C is the launcher's business: it reaches the children as a message.
     """
@@ -154,7 +154,7 @@ def process_main(name: str, pipe: Connection, setting: Setting, run: Callable[..
     code = 0
     with _log(setting.folder / "logs" / f"{name}.log"):
         try:
-            run(specs, setting, Gate(pipe))
+            main(specs, setting, Gate(pipe))
         except LauncherGoneError:
             print("the launcher is gone: ending", flush=True)
             code = 3

@@ -184,7 +184,7 @@ class Signing:
         """Whether the last six bytes are the signature of those before them."""
         return hashlib.sha256(self.key + bytes(message[:-6])).digest()[:6] == bytes(message[-6:])
 
-    def admit(self, stream: Stream, stamp: int) -> Refusal | None:
+    def accept(self, stream: Stream, stamp: int) -> Refusal | None:
         """None where a genuine message is no repetition; from then on it, and what is older, is one."""
         known, behind = self._heard.get(stream), _now() - stamp
         if known is None and behind > _TOLERANCE:

@@ -31,7 +31,7 @@ from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS
 from ftcc.sim.plants import conditions_of, find, flight_of
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["Vehicles", "columns", "load_compiled", "places", "run", "truth_array"]
+__all__ = ["Vehicles", "columns", "load_compiled", "main", "places", "truth_array"]
 
 _ATTENTION = 0.05
 """Wall time between two looks at the launcher and the clock, s."""
@@ -75,7 +75,7 @@ def truth_array(plant: str) -> tuple[str, ...]:
     )
 
 
-def run(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
+def main(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
     """Fly the vehicles of this process from the launcher's go to its release."""
     vehicles = Vehicles(specs, setting, gate)
     try:

@@ -174,7 +174,7 @@ class Swarm:
         """Start all processes."""
         # Imported by name only when a child needs them: the launcher itself flies nothing.
         from ftcc.airside.process import run as run_autopilots
-        from ftcc.sim.process import run as run_vehicles
+        from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         os.environ[_SCHEME_VARIABLE] = self.mission.scheme.name

@@ -115,7 +115,7 @@ def test_who_is_killed_while_it_writes_holds_nobody_up(tmp_path, holder):
 
 def test_who_waits_says_for_whom(tmp_path, holder, monkeypatch, capsys):
     monkeypatch.setattr(cache, "_SILENT", 0.1)
-    monkeypatch.setattr(cache, "_PATIENCE", 0.3)
+    monkeypatch.setattr(cache, "_TIMEOUT", 0.3)
     with pytest.raises(cache.CacheBusyError, match=f"process {holder.pid} has held"), cache.alone(tmp_path):
         pass
     said = capsys.readouterr().err
@@ -130,7 +130,7 @@ def test_what_is_done_alone_may_fail_and_lets_go(tmp_path):
 
 
 def test_a_result_that_cannot_be_kept_is_given_all_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "_told", set())
+    monkeypatch.setattr(cache, "_warned", set())
     (tmp_path / "kept").write_text("a file where a folder should be: nothing can be written below it")
     asked = Asked(lambda: 1.5)
     with pytest.warns(RuntimeWarning, match="Not a directory; set FTCC_CACHE_DIR") as told:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from ftcc.link.channel import SLOTS, Channel, Edge, Inbox, admit, hear, new_inbox
+from ftcc.link.channel import SLOTS, Channel, Edge, Inbox, deliver, hear, new_inbox
 
 LATENCY = EXCHANGE = 50_000
 PERIOD = 10_000
@@ -27,17 +27,17 @@ class Edge7To1:
         self.seed = seed
         self.latency = latency
 
-    def admit(self, sequence: int, radio_on: bool = True, now: int | None = None) -> bool:
+    def deliver(self, sequence: int, radio_on: bool = True, now: int | None = None) -> bool:
         """Admit a record, by default as soon as it is due; whether it passed the channel."""
         before = self.inbox.edges[0, 0, RECEIVED]
         stamp = sequence * EXCHANGE
         values = np.array([float(sequence)])
         due = stamp + self.latency if now is None else now
-        admit(self.inbox, 0, 0, sequence, stamp, radio_on, values, self.latency, due, self.seed)
+        deliver(self.inbox, 0, 0, sequence, stamp, radio_on, values, self.latency, due, self.seed)
         return bool(self.inbox.edges[0, 0, RECEIVED] > before)
 
     def verdicts(self, sequences: Iterable[int]) -> list[bool]:
-        return [self.admit(sequence) for sequence in sequences]
+        return [self.deliver(sequence) for sequence in sequences]
 
     def hear(self, now: int) -> tuple[bool, float, float]:
         """Validity, age and value held at ``now``."""
@@ -91,7 +91,7 @@ def test_a_draw_belongs_to_sender_receiver_and_number_and_not_to_the_order_of_ar
         i, edge = draw.choice(places)
         n = following[i, edge]
         before = inbox.edges[i, edge, RECEIVED]
-        admit(inbox, i, edge, n, n * EXCHANGE, True, np.array([0.0]), LATENCY, n * EXCHANGE + LATENCY, 1)
+        deliver(inbox, i, edge, n, n * EXCHANGE, True, np.array([0.0]), LATENCY, n * EXCHANGE + LATENCY, 1)
         verdicts[i, edge].append(bool(inbox.edges[i, edge, RECEIVED] > before))
         following[i, edge] += 1
         if n + 1 == 300:
@@ -151,7 +151,7 @@ def test_a_record_that_comes_twice_or_late_is_taken_once():
 @pytest.mark.parametrize("delay", [0.0, 0.004, 0.01, 0.02, 0.055, 0.3])
 def test_a_record_can_be_used_from_the_first_tick_at_stamp_plus_latency_plus_delay(delay):
     edge = Edge7To1(Channel(delay=delay))
-    edge.admit(0)
+    edge.deliver(0)
     usable = LATENCY + round(delay * 1e6)
     for now in range(LATENCY, 500_000, PERIOD):
         valid, age, _ = edge.hear(now)
@@ -164,7 +164,7 @@ def test_jitter_spreads_the_delay_evenly_between_0_and_its_value():
     edge = Edge7To1(Channel(delay=0.02, jitter=0.1))
     delays = []
     for n in range(2000):
-        edge.admit(n)
+        edge.deliver(n)
         slot = n % SLOTS
         delays.append(int(edge.inbox.slot_usable[0, 0, slot]) - n * EXCHANGE - LATENCY)
         edge.hear(n * EXCHANGE + LATENCY)
@@ -182,7 +182,7 @@ def test_newest_stamp_wins_where_jitter_lets_records_overtake_each_other():
     for now in range(LATENCY, 200 * EXCHANGE, PERIOD):
         if (now - LATENCY) % EXCHANGE == 0:
             n = (now - LATENCY) // EXCHANGE
-            edge.admit(n)
+            edge.deliver(n)
             waits = edge.inbox.slot_stamp[0, 0, n % SLOTS] == n * EXCHANGE
             usable[n] = int(edge.inbox.slot_usable[0, 0, n % SLOTS]) if waits else now
         valid, age, value = edge.hear(now)
@@ -197,9 +197,9 @@ def test_newest_stamp_wins_where_jitter_lets_records_overtake_each_other():
 
 def test_a_delayed_record_never_displaces_a_newer_one():
     edge = Edge7To1(Channel(delay=0.2))
-    edge.admit(0)
+    edge.deliver(0)
     edge.inbox.quality[0, 0] = Channel()
-    edge.admit(1)
+    edge.deliver(1)
     assert edge.hear(2 * EXCHANGE)[2] == 1.0
     assert edge.hear(20 * EXCHANGE)[2] == 1.0
     assert edge.count(WAITING) == 0
@@ -208,7 +208,7 @@ def test_a_delayed_record_never_displaces_a_newer_one():
 def test_age_grows_in_silence_and_is_never_negative():
     edge = Edge7To1(latency=0)
     assert edge.hear(0) == (False, 0.0, 0.0)
-    edge.admit(4)
+    edge.deliver(4)
     assert edge.hear(3 * EXCHANGE)[:2] == (True, 0.0)
     assert edge.hear(4 * EXCHANGE)[:2] == (True, 0.0)
     assert edge.hear(7 * EXCHANGE)[:2] == (True, 0.15)
@@ -216,7 +216,7 @@ def test_age_grows_in_silence_and_is_never_negative():
 
 def test_a_record_that_comes_late_in_wall_time_is_used_at_once_if_its_channel_delay_is_over():
     edge = Edge7To1(Channel(delay=0.05))
-    edge.admit(0, now=400_000)
+    edge.deliver(0, now=400_000)
     assert edge.hear(400_000)[:2] == (True, 0.4)
 
 
@@ -225,7 +225,7 @@ def test_as_many_records_as_there_are_slots_can_be_under_way_without_loss():
     edge = Edge7To1(Channel(delay=1.55))
     most = 0
     for n in range(200):
-        edge.admit(n)
+        edge.deliver(n)
         valid, _, value = edge.hear(n * EXCHANGE + LATENCY)
         most = max(most, edge.count(WAITING))
         assert valid == (n >= 31)
@@ -238,7 +238,7 @@ def test_more_records_under_way_than_slots_leave_the_books_true():
     """Beyond the slots (which scenarios refuse) older records give way; what is heard has its own stamp and value."""
     edge = Edge7To1(Channel(jitter=3.0))
     for n in range(500):
-        edge.admit(n)
+        edge.deliver(n)
         valid, age, value = edge.hear(n * EXCHANGE + LATENCY)
         assert 0 <= edge.count(WAITING) <= SLOTS
         assert edge.count(WAITING) == (edge.inbox.slot_stamp[0, 0] >= 0).sum()
@@ -253,22 +253,22 @@ def test_more_records_under_way_than_slots_leave_the_books_true():
 
 def test_blackout_lets_nothing_through_and_leaves_what_was_heard():
     edge = Edge7To1()
-    edge.admit(0)
+    edge.deliver(0)
     edge.inbox.quality[0, 0] = Channel(blocked=1.0)
     assert not any(edge.verdicts(range(1, 10)))
     assert edge.count(LOST) == 9
     valid, age, value = edge.hear(10 * EXCHANGE)
     assert (valid, age, value) == (True, 0.5, 0.0)
     edge.inbox.quality[0, 0] = Channel()
-    assert edge.admit(10)
+    assert edge.deliver(10)
     assert edge.hear(11 * EXCHANGE)[1:] == (0.05, 10.0)
 
 
 def test_a_radio_that_is_off_is_a_lost_record():
     edge = Edge7To1()
-    assert not edge.admit(0, radio_on=False)
+    assert not edge.deliver(0, radio_on=False)
     assert edge.hear(LATENCY) == (False, 0.0, 0.0)
-    assert edge.admit(1)
+    assert edge.deliver(1)
     assert (edge.count(LOST), edge.count(RECEIVED)) == (1, 1)
 
 
@@ -294,6 +294,6 @@ def test_plain_python_and_compiled_code_pass_the_same_records():
             listen(inbox, 0, now)
         return inbox
 
-    plain = books(getattr(admit, "py_func", admit), getattr(hear, "py_func", hear))
-    for one, other in zip(plain, books(admit, hear), strict=True):
+    plain = books(getattr(deliver, "py_func", deliver), getattr(hear, "py_func", hear))
+    for one, other in zip(plain, books(deliver, hear), strict=True):
         assert np.array_equal(one, other)

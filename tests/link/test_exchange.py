@@ -15,7 +15,7 @@ from ftcc.link.exchange import (
     Transmission,
     append,
     begin,
-    deliver,
+    deliver_due,
     new_exchange,
     new_transmission,
     octets_of,
@@ -43,7 +43,7 @@ def say(exchange: Exchange, uav: int, sequence: int, value: float, radio_on: int
 
 def heard(exchange: Exchange, inbox: Inbox, now_us: int, radio_on: int = 1) -> list[float]:
     """What UAV 1 hears of 2 and 3: the first of their values; nan where it never heard them."""
-    deliver(exchange, inbox, radio_on, 0, now_us, LATENCY, 1)
+    deliver_due(exchange, inbox, radio_on, 0, now_us, LATENCY, 1)
     hear(inbox, 0, now_us)
     return [float(v) if valid else math.nan for v, valid in zip(inbox.values[0, :, 0], inbox.valid[0], strict=True)]
 
