@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from ftcc.airside.autopilots import Autopilots, build, tick_of
 from ftcc.airside.link_events import LinkEvents, link_events
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.link.attitude_target import TARGET
 from ftcc.link.channel import Inbox
 from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.exchange import Exchange, Transmission, new_exchange, new_transmission
 from ftcc.link.mavlink import AUTOPILOT
+from ftcc.link.messages import AttitudeTarget, StateMessage
 from ftcc.link.recording import Rows
 from ftcc.link.timing import Timing
-from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, STATE, Wire, new_wire
+from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, Wire, new_wire
 
 __all__ = ["GIVE_UP", "NOTE", "PUBLISH", "REPORT", "SECOND", "WRITE", "AutopilotGroup", "build_group", "flight_of"]
 
@@ -67,7 +67,7 @@ class AutopilotGroup(NamedTuple):
     pending: NDArray[np.int64]
     """(k,): tick of the state that has come and was not worked on yet; -1: there is none."""
     arrived: NDArray[np.float64]
-    """(k, 13): that state, see ``wire.STATE``."""
+    """(k, 13): that state, see ``messages.StateMessage``."""
     arrived_controls: NDArray[np.float64]
     """(k, 4): the command in force that came with it, fractions of travel."""
     told: NDArray[np.int64]
@@ -134,13 +134,13 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
         heard_outside=np.array([bool(set(spec.hearers) - set(own)) for spec in specs], np.int64),
         travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
         pending=np.full(k, -1, np.int64),
-        arrived=np.zeros((k, len(STATE))),
+        arrived=np.zeros((k, len(StateMessage._fields))),
         arrived_controls=np.zeros((k, 4)),
         told=np.zeros(k, np.int64),
-        states=np.zeros((k, len(STATE))),
+        states=np.zeros((k, len(StateMessage._fields))),
         reported=np.zeros((k, 4)),
         controls=np.zeros((k, 4)),
-        target=np.zeros(len(TARGET)),
+        target=np.zeros(len(AttitudeTarget._fields)),
         done=np.full(k, -1, np.int64),
         given_up=np.zeros(1, np.int64),
         unsendable=np.zeros(1, np.int64),

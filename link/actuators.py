@@ -61,13 +61,16 @@ def as_sent(values):
 
 @compiled
 def encode_command(command, travel, controls):
-    """``command`` (rad, N) as fractions of the travel, in float32; an actuator without travel gets 0."""
-    for i in range(4):
+    """Write ``command`` (4,), rad and N, as fractions of ``travel`` (4,) into ``controls`` (4,), in float32.
+
+    An actuator without travel gets 0.
+    """
+    for i in range(len(ACTUATORS)):
         controls[i] = float(np.float32(command[i] / travel[i])) if travel[i] > 0.0 else 0.0
 
 
 @compiled
 def decode_command(controls, travel, command):
-    """The inverse of `encode_command`."""
-    for i in range(4):
+    """The inverse of `encode_command`: writes ``controls`` (4,) as ``command`` (4,), rad and N."""
+    for i in range(len(ACTUATORS)):
         command[i] = controls[i] * travel[i]

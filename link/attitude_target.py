@@ -11,15 +11,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
+from ftcc.link.actuators import SLOT, THRUST, as_sent
+from ftcc.link.compiled import compiled, fields, fill, store
+from ftcc.link.messages import AttitudeTarget
 
-from ftcc.link.actuators import SLOT, THRUST
-from ftcc.link.compiled import compiled
-
-__all__ = ["TARGET", "UNCODED", "AttitudeCode", "decode_target", "encode_target", "path_of"]
-
-TARGET = ("q1", "q2", "q3", "q4", "thrust")
-"""Fields of SET_ATTITUDE_TARGET that are used: attitude, body to north-east-down, and thrust as a share of the full."""
+__all__ = ["UNCODED", "AttitudeCode", "decode_target", "encode_target", "path_of"]
 
 _LOAD, _BANK = SLOT["load_factor"], SLOT["bank"]
 _LEAST_SPEED = 10.0
@@ -49,13 +45,18 @@ def path_of(vx, vy, vz):
 @compiled
 def _pressure(V, code):
     speed = max(V, _LEAST_SPEED)
-    return code[0] / (speed * speed)
+    return code.loading / (speed * speed)
 
 
 @compiled
 def encode_target(command, V, gamma, chi, travel, code, target):
-    """Write ``command`` (4,), by slot, as a ``target`` (5,), in float32, see `TARGET`."""
-    alpha = (command[_LOAD] * _pressure(V, code) - code[1]) / code[2]
+    """Write ``command`` (4,), by slot, as an `AttitudeTarget` into ``target`` (5,), in float32.
+
+    ``V`` (m/s), ``gamma`` and ``chi`` (rad) are the path of the state that it answers; ``travel`` (4,) is the full
+    deflection of each actuator, ``code`` (3,) an `AttitudeCode`.
+    """
+    nominal = fields(AttitudeCode, code)
+    alpha = (command[_LOAD] * _pressure(V, nominal) - nominal.CL0) / nominal.CLa
     a, b = math.cos(0.5 * chi), math.sin(0.5 * chi)
     c, d = math.cos(0.5 * gamma), math.sin(0.5 * gamma)
     e, f = math.cos(0.5 * command[_BANK]), math.sin(0.5 * command[_BANK])
@@ -63,13 +64,15 @@ def encode_target(command, V, gamma, chi, travel, code, target):
     # Rz(chi) Ry(gamma), then Rx(bank) Ry(alpha).
     p0, p1, p2, p3 = a * c, -b * d, a * d, b * c
     r0, r1, r2, r3 = e * g, f * g, e * h, f * h
-    target[0] = p0 * r0 - p1 * r1 - p2 * r2 - p3 * r3
-    target[1] = p0 * r1 + p1 * r0 + p2 * r3 - p3 * r2
-    target[2] = p0 * r2 - p1 * r3 + p2 * r0 + p3 * r1
-    target[3] = p0 * r3 + p1 * r2 - p2 * r1 + p3 * r0
-    target[4] = command[THRUST] / travel[THRUST]
-    for n in range(5):
-        target[n] = float(np.float32(target[n]))
+    encoded = AttitudeTarget(
+        q1=p0 * r0 - p1 * r1 - p2 * r2 - p3 * r3,
+        q2=p0 * r1 + p1 * r0 + p2 * r3 - p3 * r2,
+        q3=p0 * r2 - p1 * r3 + p2 * r0 + p3 * r1,
+        q4=p0 * r3 + p1 * r2 - p2 * r1 + p3 * r0,
+        thrust=command[THRUST] / travel[THRUST],
+    )
+    store(encoded, target)
+    as_sent(target)
 
 
 @compiled
@@ -78,7 +81,7 @@ def decode_target(target, V, gamma, chi, travel, code, command):
     a, b = math.cos(0.5 * chi), math.sin(0.5 * chi)
     c, d = math.cos(0.5 * gamma), math.sin(0.5 * gamma)
     p0, p1, p2, p3 = a * c, -b * d, a * d, b * c
-    q0, q1, q2, q3 = target[0], target[1], target[2], target[3]
+    q0, q1, q2, q3, thrust = fields(AttitudeTarget, target)
     r0 = p0 * q0 + p1 * q1 + p2 * q2 + p3 * q3
     r1 = p0 * q1 - p1 * q0 - p2 * q3 + p3 * q2
     r2 = p0 * q2 + p1 * q3 - p2 * q0 - p3 * q1
@@ -87,8 +90,8 @@ def decode_target(target, V, gamma, chi, travel, code, command):
         r0, r1, r2, r3 = -r0, -r1, -r2, -r3
     bank = math.atan2(2.0 * (r1 * r0 + r2 * r3), r0 * r0 - r1 * r1 + r2 * r2 - r3 * r3)
     alpha = math.atan2(2.0 * (r0 * r2 + r1 * r3), r0 * r0 + r1 * r1 - r2 * r2 - r3 * r3)
-    for n in range(4):
-        command[n] = 0.0
+    fill(command, 0.0)
     command[_BANK] = bank
-    command[_LOAD] = (alpha * code[2] + code[1]) / _pressure(V, code)
-    command[THRUST] = target[4] * travel[THRUST]
+    nominal = fields(AttitudeCode, code)
+    command[_LOAD] = (alpha * nominal.CLa + nominal.CL0) / _pressure(V, nominal)
+    command[THRUST] = thrust * travel[THRUST]

@@ -1,7 +1,7 @@
-"""What is kept on disk from one start to the next: compiled functions, and results that take long to come by.
+"""The cache on disk, from one start to the next: compiled functions, and results that take long to compute.
 
-Everything lies in one folder, named by the hash of all sources that it may depend on: an edit anywhere begins a new
-one. This module imports neither numba nor numpy, so that what is kept can be had without them.
+It lies in a folder named by the hash of all sources that it may depend on: an edit anywhere begins a new one. This
+module imports neither numba nor numpy, so that kept results are read without them.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import functools
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import json
 import os
 import shutil
@@ -31,11 +32,15 @@ SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
 
 _KEPT_CACHES = 6
+_DIGITS = 32
+"""Hexadecimal digits of a hash that name a file or folder."""
 _PACKAGES = ("link", "sim", "airside")
+"""Folders beside this one whose compiled functions may become part of others. Files that only use them need not be
+named: numba notices an edit of the file of a function itself, and so does `kept`."""
 _LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
-"""What the contents depend on beside the sources: pymavlink gives the layouts of messages."""
+"""On which the contents depend beside the sources: pymavlink gives the layouts of messages."""
 _POLL, _SILENT, _TIMEOUT = 0.02, 3.0, 30.0
-"""A process that waits for another one that writes looks so often, tells so after so long, and then gives up, s."""
+"""A process that waits for another one to write polls, reports that it waits, and gives up after so long, s."""
 
 _warned: set[str] = set()
 """Warnings that this process has given."""
@@ -51,7 +56,7 @@ class CacheBusyError(OSError):
 def alone(place: Path) -> Iterator[None]:
     """Be the only process that writes into the folder ``place``.
 
-    The lock is the kernel's: who dies, however, lets go of it. Who waits says so on stderr, and for whom.
+    The kernel holds the lock and frees it when its process dies. A process that waits reports on stderr for which one.
 
     Raises
     ------
@@ -80,7 +85,7 @@ def alone(place: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            # Said, not left to close(): a process forked meanwhile has the file open, too.
+            # Explicitly, not by close(): a process forked meanwhile has the file open, too.
             fcntl.flock(file, fcntl.LOCK_UN)
 
 
@@ -91,13 +96,9 @@ def _holder(file: Any) -> str:
 
 
 def _source_files() -> list[Path]:
+    """Every file whose compiled functions can become part of those of another file."""
     root = Path(__file__).resolve().parent.parent
     found = [path for package in _PACKAGES for path in (root / package).rglob("*.py")]
-    found += [
-        path
-        for name in ("simulation/flight_loop.py", "scenario/catalogue.py")
-        if (path := root / "groundside" / name).is_file()
-    ]
     for entry in importlib.metadata.entry_points(group=SCHEME_ENTRY_POINTS):
         spec = importlib.util.find_spec(entry.module.split(".")[0])
         for place in (spec.submodule_search_locations or []) if spec else []:
@@ -109,14 +110,14 @@ def _source_files() -> list[Path]:
 
 @functools.cache
 def folder() -> Path:
-    """Where the program as it stands keeps things; the folders of all but its last few versions are cleared away."""
+    """The folder of this version of the program; removes the folders of all but its last few versions."""
     versions = [sys.version, *(importlib.metadata.version(name) for name in _LIBRARIES)]
     digest = hashlib.sha256(" ".join(versions).encode())
     for path in _source_files():
         digest.update(str(path).encode())
         digest.update(path.read_bytes())
-    own = cache_folder(f"compiled/{digest.hexdigest()[:16]}")
-    # Others clear away at the same time, and what lies there may be another user's.
+    own = cache_folder(f"compiled/{digest.hexdigest()[:_DIGITS]}")
+    # Other processes remove folders at the same time, and what lies there may be another user's.
     with contextlib.suppress(OSError):
         os.utime(own)
         others = sorted((path for path in own.parent.iterdir() if path != own), key=lambda path: path.stat().st_mtime)
@@ -126,7 +127,7 @@ def folder() -> Path:
 
 
 def not_kept(error: OSError) -> None:
-    """Warn, once for each reason, that the cache takes nothing: what it should hold is made anew at every start."""
+    """Warn, once for each reason, that nothing can be written into the cache: each start computes it anew."""
     why = error.strerror or error
     text = f"compiled code cannot be kept, each start compiles anew: {why}; set FTCC_CACHE_DIR to a folder with room"
     if text not in _warned:
@@ -137,16 +138,17 @@ def not_kept(error: OSError) -> None:
 def kept(function: F) -> F:
     """Keep the results of ``function`` on disk: it is called once for each list of arguments, not once a start.
 
-    For functions of our own that depend on their arguments and on the sources named above alone. Arguments and results
-    are what JSON holds; lists come back where there were tuples. What raises an exception is not kept. Plain Python
-    (``NUMBA_DISABLE_JIT=1``) is there to be compared with, and keeps nothing.
+    For functions that depend on their arguments, their own file and the sources named above alone. Arguments and
+    results must be JSON; tuples come back as lists. An exception is not kept. Plain Python (``NUMBA_DISABLE_JIT=1``)
+    serves comparisons, and keeps nothing.
     """
+    source = hashlib.sha256(Path(inspect.getfile(function)).read_bytes()).hexdigest()
 
     @functools.wraps(function)
     def recalled(*arguments: Any) -> Any:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return function(*arguments)
-        name = hashlib.sha256(json.dumps(arguments).encode()).hexdigest()[:32]
+        name = hashlib.sha256(json.dumps([source, *arguments]).encode()).hexdigest()[:_DIGITS]
         path = folder() / "kept" / f"{function.__module__}.{function.__name__}" / f"{name}.json"
         try:
             return json.loads(path.read_bytes())

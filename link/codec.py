@@ -1,4 +1,4 @@
-"""MAVLink 2 as bytes: messages packed into datagrams and read from them, one by one; what is no message is dropped.
+"""MAVLink 2 as bytes: messages packed into datagrams, and read from them one by one; invalid ones are dropped.
 
 The bare dialect class is used (not mavutil): a quarter of the import time and half of the memory.
 """
@@ -19,6 +19,8 @@ __all__ = ["Codec", "dialect"]
 
 _SIGNATURE = 13
 """Bytes of a signature block: link, time stamp (6), signature (6)."""
+_STAMP = slice(1, 7)
+"""Where its time stamp stands."""
 _MOST_REFUSALS = 64
 _UNSIGNED = frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT})
 """Messages that are read without a signature."""
@@ -47,7 +49,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             self.refusal = Refusal("other key", srcSystem, srcComponent)
         else:
             stream = (block[0], srcSystem, srcComponent)
-            self.refusal = self.own_signing.accept(stream, int.from_bytes(block[1:7], "little"))
+            self.refusal = self.own_signing.accept(stream, int.from_bytes(block[_STAMP], "little"))
         return self.refusal is None
 
 

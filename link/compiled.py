@@ -194,9 +194,9 @@ def refusal(function: Any, *arguments: Any) -> str:
 def _reason(text: str) -> str:
     """What matters of numba's message: the innermost problem, and the first place outside numba that it names."""
     lines = [line.strip() for line in text.splitlines()]
-    said = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))]
+    first, *more = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))] or [""]
     places = [line for line in lines if line.startswith("File ") and "/numba/" not in line]
-    shown = said[:1] + [line for line in said[1:3] if line.startswith(">>>")] + places[:1]
+    shown = [first, *(line for line in more[:2] if line.startswith(">>>")), *places[:1]]
     return "; ".join(line.rstrip(":") for line in shown)
 
 

@@ -1,9 +1,10 @@
-"""The exchange of records between UAVs: what was said last, who is due to hear it, and how it travels on the mesh.
+"""The exchange of records between UAVs: the last records of each sender, when they are due, and how they travel.
 
-Every UAV tells its neighbours a record, a few shared numbers with a stamp, once in an exchange period. A process keeps
-the last records of the UAVs that its own ones hear; a record waits there until its latency has passed, then it goes
-through the emulated channel of each edge (`channel`). What a process's UAVs tell at one instant is one transmission on
-the mesh. The functions are compiled: the autopilot process and the single-process simulation run the very same code.
+Once in an exchange period each UAV sends its out-neighbours a record: a few shared numbers with a stamp. A process
+keeps the last records of its own UAVs and of their in-neighbours. A record waits there until its latency has passed,
+then it goes through the emulated channel of each edge (`channel`). The records of a process's UAVs at one instant are
+one transmission on the mesh. The functions are compiled: the autopilot process and the single-process simulation run
+the same code.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.channel import Edge, deliver
-from ftcc.link.compiled import compiled, copy
+from ftcc.link.compiled import compiled, copy, fields, store
 
 __all__ = [
     "VERSION",
@@ -45,16 +46,16 @@ _NEXT = Edge._fields.index("next_sequence")
 
 
 class TransmissionError(ValueError):
-    """What came by the mesh, or was to be put on it, is no transmission of this version."""
+    """Not a valid transmission of this version."""
 
 
 class Exchange(NamedTuple):
-    """The last records of the s UAVs that the k UAVs of a process hear, or that are its own."""
+    """The last records of s senders: the k UAVs of a process and their in-neighbours."""
 
     sender: NDArray[np.int64]
     """(k, n): the row below of the UAV behind each in-edge."""
     row_of: NDArray[np.int64]
-    """(256,): the row of each UAV by its id; -1 where it is not heard here."""
+    """(256,): the row of each UAV by its id; -1 where no UAV of this process hears it."""
     next_sequence: NDArray[np.int64]
     """(s,): sequence number that the next record of a sender would have."""
     sequence: NDArray[np.int64]
@@ -68,13 +69,13 @@ class Exchange(NamedTuple):
 
 
 def new_exchange(own: Sequence[int], senders: Sequence[Sequence[int]], edges: int, values: int) -> Exchange:
-    """An exchange in which nothing was said yet.
+    """An exchange without records.
 
     Parameters
     ----------
     own : ids of the process's UAVs: the first rows, in this order.
-    senders : for each of them the ids of the UAVs that it hears.
-    edges : in-edges that there is room for, see ``Inbox``.
+    senders : for each of them the ids of its in-neighbours.
+    edges : largest number of in-edges of a UAV, see ``Inbox``.
     values : numbers in a record.
     """
     everybody = [*own, *sorted({uav for row in senders for uav in row} - set(own))]
@@ -117,9 +118,9 @@ def newest_slot(exchange, row):
 
 @compiled
 def deliver_due(exchange, inbox, radio_on, i, now_us, latency_us, seed):
-    """Pass what is due for UAV ``i`` at ``now_us`` through the channels of its in-edges into its inbox.
+    """Deliver the records that are due for UAV ``i`` (index) at ``now_us`` through the channels of its in-edges.
 
-    ``radio_on`` tells whether its own radio is on; a radio that is off neither hears nor is heard.
+    ``radio_on`` is 1 while its own radio is on; a radio that is off neither receives nor sends. Times are in us.
     """
     for edge in range(inbox.degree[i]):
         row = exchange.sender[i, edge]
@@ -144,7 +145,7 @@ class Header(NamedTuple):
     number: int
     """Lockstep: number of the exchange."""
     heard: int
-    """Lockstep: the sender has the transmissions up to this number of all whom it waits for."""
+    """Lockstep: the sender has the transmissions up to this number of all processes that it waits for."""
     last: int
     """1: nothing will follow."""
     records: int
@@ -153,9 +154,19 @@ class Header(NamedTuple):
     """Numbers in each record."""
 
 
+class RecordHeader(NamedTuple):
+    """The words of a record before its values."""
+
+    uav: int
+    sequence: int
+    stamp_us: int
+    """Simulated time for which its values hold, us."""
+    radio_on: int
+    """1 where the sender's radio is on."""
+
+
 _HEADER = len(Header._fields)
-_PREFIX = 4
-"""Words of a record before its values: UAV, sequence number, stamp, whether its radio is on."""
+_PREFIX = len(RecordHeader._fields)
 _VERSION, _NUMBER, _HEARD, _LAST, _COUNT, _VALUES = range(_HEADER)
 
 
@@ -196,7 +207,7 @@ def append(transmission, uav, sequence, stamp_us, radio_on, values):
             return False
     at = transmission.used[0]
     words = transmission.words
-    words[at], words[at + 1], words[at + 2], words[at + 3] = uav, sequence, stamp_us, radio_on
+    store(RecordHeader(uav, sequence, stamp_us, radio_on), words[at:])
     copy(values[: words[_VALUES]], transmission.floats[at + _PREFIX :])
     words[_COUNT] += 1
     transmission.used[0] = at + _PREFIX + words[_VALUES]
@@ -208,9 +219,9 @@ _GOOD, _SHORT, _OTHER_VERSION, _WRONG_LENGTH, _NOT_FINITE = range(5)
 
 @compiled
 def take_in(transmission, exchange):
-    """Keep the records of a transmission that came by the mesh, as far as somebody here hears their senders.
+    """Keep the records of a transmission from the mesh whose senders a UAV of this process hears.
 
-    Returns a code for `problem_text`; not 0, and nothing is kept, where it is not sound.
+    Returns a code for `problem_text`: 0, or why the transmission is not valid; then nothing is kept.
     """
     words, floats, used = transmission.words, transmission.floats, transmission.used[0]
     if used < _HEADER:
@@ -227,15 +238,15 @@ def take_in(transmission, exchange):
                 return _NOT_FINITE
     for n in range(words[_COUNT]):
         at = _HEADER + n * width
-        uav = words[at]
-        if 0 <= uav < exchange.row_of.shape[0] and exchange.row_of[uav] >= 0:
+        record = fields(RecordHeader, words[at:])
+        if 0 <= record.uav < exchange.row_of.shape[0] and exchange.row_of[record.uav] >= 0:
             values = floats[at + _PREFIX : at + width]
-            post(exchange, exchange.row_of[uav], words[at + 1], words[at + 2], words[at + 3], values)
+            post(exchange, exchange.row_of[record.uav], record.sequence, record.stamp_us, record.radio_on, values)
     return _GOOD
 
 
 def problem_text(code: int, transmission: Transmission) -> str:
-    """What `take_in` found wrong, for people."""
+    """A text for a code of `take_in` that is not 0."""
     header = transmission.words[:_HEADER].tolist()
     return {
         _SHORT: f"a transmission of {8 * int(transmission.used[0])} bytes is too short",

@@ -262,7 +262,11 @@ def read_failure(messages: Sequence[Any]) -> tuple[Failure | None, int]:
     if sizes_array.get_type() != "DEBUG_FLOAT_ARRAY" or command.get_type() != "COMMAND_LONG":
         return None, 0
     meaning = meaning_of(command.param1, command.param2, command.param3)
-    if sizes_array.name.rstrip("\0") != _SIZES_ARRAY or command.command != dialect.MAV_CMD_INJECT_FAILURE or meaning is None:
+    if (
+        sizes_array.name.rstrip("\0") != _SIZES_ARRAY
+        or command.command != dialect.MAV_CMD_INJECT_FAILURE
+        or meaning is None
+    ):
         return None, 0
     names = [size.name for size in AIRFRAME_SIZES]
     sizes = dict(zip(names, map(as_typed, sizes_array.data), strict=False))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 __all__ = ["NoFolderError", "cache_folder", "config_folder", "matplotlib_folder", "runtime_folder"]
 
-_told: set[str] = set()
+_warned: set[str] = set()
 """Warnings that this process has given."""
 
 
@@ -159,11 +159,11 @@ def _private_temporary(variable: str) -> Path:
 
 
 def _stand_in(folder: Path | None, error: OSError, variable: str) -> Path:
-    """The private folder that is used instead of ``folder``; the user is told once."""
+    """The private folder that is used instead of ``folder``; the user is warned once."""
     instead = _private_temporary(variable)
     text = f"{f'{folder}: {_why(error)}' if folder else error}; {instead} is used instead (set {variable} to choose)"
-    if text not in _told:
-        _told.add(text)
+    if text not in _warned:
+        _warned.add(text)
         warnings.warn(text, RuntimeWarning, stacklevel=3)
     return instead
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.codec import dialect
-from ftcc.link.compiled import compiled, compiled_apart
+from ftcc.link.compiled import compiled, compiled_apart, fields, store
 
 __all__ = [
     "ACTUATORS",
@@ -37,6 +37,24 @@ _CHECKSUM = 2
 _LONGEST = 255
 LARGEST_FRAME = _HEADER + _LONGEST + _CHECKSUM
 """Bytes."""
+
+
+class _Header(NamedTuple):
+    """The bytes with which a frame begins."""
+
+    magic: int
+    length: int
+    """Of the payload, bytes."""
+    incompatible: int
+    """Flags that a receiver must know, such as that of a signature."""
+    compatible: int
+    sequence: int
+    system: int
+    component: int
+    number_low: int
+    """Message id, 24 bits."""
+    number_middle: int
+    number_high: int
 
 
 class Layout(NamedTuple):
@@ -203,16 +221,9 @@ def write_frame(payload, shape, system, component, sequence, out, at):
     length = shape.length
     while length > 1 and payload.octets[length - 1] == 0:
         length -= 1
-    out[at] = _MAGIC
-    out[at + 1] = length
-    out[at + 2] = 0
-    out[at + 3] = 0
-    out[at + 4] = sequence & 0xFF
-    out[at + 5] = system
-    out[at + 6] = component
-    out[at + 7] = shape.number & 0xFF
-    out[at + 8] = shape.number >> 8 & 0xFF
-    out[at + 9] = shape.number >> 16 & 0xFF
+    number = shape.number
+    low, middle, high = number & 0xFF, number >> 8 & 0xFF, number >> 16 & 0xFF
+    store(_Header(_MAGIC, length, 0, 0, sequence & 0xFF, system, component, low, middle, high), out[at:])
     end = at + _HEADER + length
     for n in range(length):
         out[at + _HEADER + n] = payload.octets[n]
@@ -232,13 +243,16 @@ def read_frame(data, at, end, payload):
         The message id and where the next frame begins; (-1, at) if there is no perfect frame of one of the five
         messages, without a signature and with finite floats.
     """
-    if end - at < _HEADER + 1 + _CHECKSUM or data[at] != _MAGIC or data[at + 2] != 0:
+    if end - at < _HEADER + 1 + _CHECKSUM:
         return -1, at
-    length = np.int64(data[at + 1])
+    header = fields(_Header, data[at:])
+    if header.magic != _MAGIC or header.incompatible != 0:
+        return -1, at
+    length = np.int64(header.length)
     stop = at + _HEADER + length
     if length == 0 or stop + _CHECKSUM > end:
         return -1, at
-    number = np.int64(data[at + 7]) | np.int64(data[at + 8]) << 8 | np.int64(data[at + 9]) << 16
+    number = np.int64(header.number_low) | np.int64(header.number_middle) << 8 | np.int64(header.number_high) << 16
     for shape in _LAYOUTS:
         if shape.number == number and length <= shape.length:
             checksum = _checksum(data, at + 1, stop, shape.seed)

@@ -1,7 +1,7 @@
-"""How the launcher lets its processes go, holds them and releases them: messages over one pipe per process.
+"""The gate between the launcher and its processes: messages over one pipe per process.
 
-A process reports `Ready`; the launcher answers `Go`. The same gate holds a swarm at a tick, sets its pace, tells that a
-UAV is gone, and releases everybody at the end. A process whose launcher dies sees its pipe close and ends.
+A process reports `Ready`; the launcher answers `Go`. The same gate holds a swarm at a tick, sets its pace, reports that
+a UAV is gone, and releases all processes at the end. A process whose launcher dies sees its pipe close, and ends.
 """
 
 from __future__ import annotations
@@ -39,11 +39,14 @@ class Ready:
 
 @dataclass(frozen=True)
 class Ended:
-    """Process -> launcher: all ticks flown or stopped, recording flushed; ``late`` of all ``ticks`` of its UAVs."""
+    """Process -> launcher: all ticks are flown, or the flight was stopped; the recording is written."""
 
     tick: int
+    """The next tick, which was not flown."""
     late: int = 0
+    """Ticks at which a vehicle had no command that answered its last state, summed over its UAVs."""
     ticks: int = 0
+    """Ticks flown, summed over its UAVs."""
 
 
 @dataclass(frozen=True)
@@ -52,21 +55,24 @@ class Lost:
 
     uav: int
     at_us: int
+    """Simulated time, us."""
     reason: str
 
 
 @dataclass(frozen=True)
 class Said:
-    """Process -> launcher: an event worth showing."""
+    """Process -> launcher: an event, for the log and the dashboard."""
 
     severity: str
+    """"info", "warning" or "error"."""
     text: str
     uav: int | None = None
     at_us: int | None = None
+    """Simulated time, us."""
     who: str = ""
-    """Who asked for it, where somebody on the ground did."""
+    """The sender of the request that caused it, as "system/component"; empty without one."""
     outcome: str = ""
-    """What became of that."""
+    """The answer to that request, such as "accepted" or "denied"."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,7 @@ class Pace:
     tick: int | None
     """None: the next one, whichever that is."""
     speed: float
+    """Simulated seconds per second."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +95,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Held:
-    """Vehicle -> launcher: stands before this tick, which the limit does not let it pass."""
+    """Vehicle -> launcher: it waits before this tick, which is beyond the limit."""
 
     tick: int
 
@@ -103,19 +110,19 @@ class Go:
 
 @dataclass(frozen=True)
 class Gone:
-    """Launcher -> autopilot: the process of a neighbour has died; expect nothing more of it."""
+    """Launcher -> autopilot: the process of a neighbour has died; nothing more will come from it."""
 
     uav: int
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Launcher -> process: end the flight now, in order."""
+    """Launcher -> process: end the flight now, and write the recording."""
 
 
 @dataclass(frozen=True)
 class Release:
-    """Launcher -> process: everybody has ended; close what others may still have needed."""
+    """Launcher -> process: all have ended; close what others may still have needed."""
 
 
 @dataclass
@@ -130,21 +137,27 @@ class Gate:
     released: bool = False
     _new_pace: Pace | None = None
     _held: int | None = None
-    """The tick at which this process has said that it is held."""
+    """The tick at which this process last reported that it is held."""
 
     def fileno(self) -> int:
         """For ``select``."""
         return self.pipe.fileno()
 
     def tell(self, message: Any) -> None:
-        """Say something to the launcher."""
+        """Send a message to the launcher.
+
+        Raises
+        ------
+        LauncherGoneError
+            If it has gone.
+        """
         try:
             self.pipe.send(message)
         except (BrokenPipeError, ConnectionResetError) as error:
             raise LauncherGoneError from error
 
     def read(self) -> None:
-        """Take in what the launcher has said.
+        """Take in the launcher's messages.
 
         Raises
         ------
@@ -183,7 +196,7 @@ class Gate:
         return self.limit is None or tick <= self.limit
 
     def hold(self, tick: int) -> None:
-        """Say, once, that the limit holds this process before a tick."""
+        """Report, once, that the limit holds this process before a tick."""
         if self._held != tick:
             self._held = tick
             self.tell(Held(tick))
@@ -195,7 +208,7 @@ class Gate:
             self.read()
 
     def wait_until_released(self, seconds: float) -> None:
-        """Block until everybody has ended, at most for ``seconds``."""
+        """Block until all processes have ended, at most for ``seconds`` (wall s)."""
         until = time.monotonic() + seconds
         while not self.released and time.monotonic() < until:
             self.pipe.poll(max(0.0, until - time.monotonic()))

@@ -31,7 +31,11 @@ AUTOPILOT = dialect.MAV_COMP_ID_AUTOPILOT1
 SIMULATOR = 25
 """Component id of a simulated vehicle (MAV_COMP_ID_USER1)."""
 STATION = 254
-"""System id of the ground station; 245 and 255 are those of other people's clients."""
+"""System id of the ground station; other clients use 245 and 255."""
+_TEXT = 50
+"""Characters of a STATUSTEXT, at most."""
+_ARRAY = 58
+"""Numbers of a DEBUG_FLOAT_ARRAY."""
 NAME_LENGTH = 16
 """Characters of a parameter's name, at most."""
 LOOPBACK = "127.0.0.1"
@@ -158,9 +162,9 @@ def ends(message: Any) -> bool:
 
 
 def float_array(stamp_us: int, name: str, values: Sequence[float]) -> Any:
-    """Up to 58 numbers as DEBUG_FLOAT_ARRAY; what no message may carry (nan, beyond float32) is sent as 0."""
+    """Up to 58 numbers as a DEBUG_FLOAT_ARRAY; nan, infinite and too large ones are sent as 0."""
     data = [value if abs(value) < _LARGEST else 0.0 for value in values]
-    return dialect.MAVLink_debug_float_array_message(stamp_us, name.encode(), 0, data + [0.0] * (58 - len(data)))
+    return dialect.MAVLink_debug_float_array_message(stamp_us, name.encode(), 0, data + [0.0] * (_ARRAY - len(data)))
 
 
 def as_typed(value: float) -> float:
@@ -169,5 +173,5 @@ def as_typed(value: float) -> float:
 
 
 def status_text(severity: int, text: str) -> Any:
-    """STATUSTEXT, cut to the 50 characters that it holds."""
-    return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:50])
+    """A STATUSTEXT, cut to the 50 characters that it holds."""
+    return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:_TEXT])

@@ -1,4 +1,4 @@
-"""MAVLink 2 signing of the ground links: the key file, rising time stamps, and what has been heard, across restarts.
+"""MAVLink 2 signing of the ground links: the key file, and the time stamps sent and heard, kept across restarts.
 
 A key file holds one line, a pass phrase; the key is its SHA-256, as in MAVProxy and QGroundControl, so that the same
 phrase can be typed there.
@@ -23,6 +23,8 @@ __all__ = ["KeyFileError", "Refusal", "Signing", "default_key_file", "new_key_fi
 _EPOCH = 1_420_070_400
 """2015-01-01 UTC, from which time stamps count in units of 10 us, s since 1970."""
 _UNITS = 100_000
+_SIGNATURE = 6
+"""Bytes of a signature: the beginning of a SHA-256."""
 _TOLERANCE = 60 * _UNITS
 """By how much a sender that is heard for the first time may be behind."""
 
@@ -30,7 +32,7 @@ Stream = tuple[int, int, int]
 """Link, system and component of a sender."""
 
 Reason = Literal["unsigned", "other key", "repeated", "late"]
-"""Why a message is refused: it bears no signature; not one by our key; one that was heard; one of long ago."""
+"""Why a message is refused: it has no signature; another key's; one that was heard before; a stamp of long ago."""
 
 
 class Refusal(NamedTuple):
@@ -182,10 +184,15 @@ class Signing:
 
     def genuine(self, message: bytes | bytearray) -> bool:
         """Whether the last six bytes are the signature of those before them."""
-        return hashlib.sha256(self.key + bytes(message[:-6])).digest()[:6] == bytes(message[-6:])
+        return hashlib.sha256(self.key + bytes(message[:-_SIGNATURE])).digest()[:_SIGNATURE] == bytes(
+            message[-_SIGNATURE:]
+        )
 
     def accept(self, stream: Stream, stamp: int) -> Refusal | None:
-        """None where a genuine message is no repetition; from then on it, and what is older, is one."""
+        """Accept a genuine message with this time stamp, or say why not: a repetition, or too old.
+
+        Once accepted, the same and older stamps of this stream are repetitions.
+        """
         known, behind = self._heard.get(stream), _now() - stamp
         if known is None and behind > _TOLERANCE:
             return Refusal("late", *stream[1:], behind / _UNITS)

@@ -1,8 +1,9 @@
-"""The wire between the vehicles and the autopilots of a process: their sockets, and a tick's messages as datagrams.
+"""The wire between vehicles and autopilots: the sockets of a process, and a tick's messages as datagrams.
 
-A vehicle sends its state: ATTITUDE_QUATERNION and LOCAL_POSITION_NED, and HIL_ACTUATOR_CONTROLS where the autopilot
-does not know which command is in force. The autopilot answers with HIL_ACTUATOR_CONTROLS, with SET_ATTITUDE_TARGET, or,
-for a leader, with SET_POSITION_TARGET_LOCAL_NED. Compiled code packs and reads them, see `frames`.
+A vehicle sends its state: ATTITUDE_QUATERNION and LOCAL_POSITION_NED, and HIL_ACTUATOR_CONTROLS unless the command in
+force is the one that answers the last state. The autopilot answers with HIL_ACTUATOR_CONTROLS, with
+SET_ATTITUDE_TARGET, or, for a leader, with SET_POSITION_TARGET_LOCAL_NED. Compiled code packs and reads them, see
+`frames`; their columns are those of `messages`.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.link.actuators import ACTUATORS as ACTUATOR_NAMES
 from ftcc.link.codec import Codec, dialect
-from ftcc.link.compiled import compiled, compiled_apart
+from ftcc.link.compiled import compiled, compiled_apart, fields, store
 from ftcc.link.frames import (
     ACTUATORS,
     ATTITUDE,
@@ -30,13 +32,13 @@ from ftcc.link.frames import (
     write_frame,
 )
 from ftcc.link.mavlink import Endpoint
+from ftcc.link.messages import AttitudeTarget, PositionTarget, StateMessage
 from ftcc.link.system_calls import READABLE, receive, send
 
 __all__ = [
     "BY_ACTUATORS",
     "BY_ATTITUDE",
     "BY_POSITION",
-    "STATE",
     "Wire",
     "connect",
     "is_readable",
@@ -55,13 +57,15 @@ __all__ = [
     "split",
 ]
 
-STATE = ("q1", "q2", "q3", "q4", "rollspeed", "pitchspeed", "yawspeed", "x", "y", "z", "vx", "vy", "vz")
-"""The float32 fields of ATTITUDE_QUATERNION and LOCAL_POSITION_NED, in this order."""
-
 BY_ACTUATORS, BY_ATTITUDE, BY_POSITION = range(3)
 """How commands travel to a vehicle: as actuator commands, as attitude targets, or, a leader's, as position targets."""
 
 _LARGEST_DATAGRAM = 4096
+_COMMANDS = len(ACTUATOR_NAMES)
+_STATE_WIDTH = len(StateMessage._fields)
+_POSITION_AT = StateMessage._fields.index("x")
+"""Where the fields of LOCAL_POSITION_NED begin in a `StateMessage`."""
+_TARGET_THRUST = AttitudeTarget._fields.index("thrust")
 
 # Where the fields stand. Those that follow each other are written one after the other.
 _Q1 = place(dialect.MAVLink_attitude_quaternion_message, "q1")
@@ -232,28 +236,28 @@ def _send(wire, i, end):
 def _put_command(wire, stamp_us, controls):
     clear(wire.payload)
     wire.payload.longs[0] = stamp_us
-    for n in range(4):
+    for n in range(_COMMANDS):
         wire.payload.floats[_CONTROLS + n] = controls[n]
 
 
 @compiled_apart
 def send_state(wire, i, stamp_us, state, controls, with_controls):
-    """Send the state (13,), see `STATE`, and, where asked for, the command in force (4,), as fractions of travel.
+    """Send a `StateMessage` (13,) and, where wanted, the command in force (4,), as fractions of travel.
 
-    False, and nothing is sent, where a value is not finite, or not within float32; so do the other functions.
+    Returns False, and sends nothing, where a value is not finite or too large for float32; so do the other functions.
     """
     payload = wire.payload
     clear(payload)
     payload.words[0] = stamp_us // 1000
-    for n in range(7):
+    for n in range(_POSITION_AT):
         payload.floats[_Q1 + n] = state[n]
     end = _append(wire, i, ATTITUDE, 0)
     if end < 0:
         return _send(wire, i, end)
     clear(payload)
     payload.words[0] = stamp_us // 1000
-    for n in range(6):
-        payload.floats[_X + n] = state[7 + n]
+    for n in range(_STATE_WIDTH - _POSITION_AT):
+        payload.floats[_X + n] = state[_POSITION_AT + n]
     end = _append(wire, i, POSITION, end)
     if with_controls and end > 0:
         _put_command(wire, stamp_us, controls)
@@ -263,20 +267,20 @@ def send_state(wire, i, stamp_us, state, controls, with_controls):
 
 @compiled_apart
 def send_command(wire, i, stamp_us, controls):
-    """Send an actuator command (4,), as fractions of travel, that answers the state of that stamp."""
+    """Send an actuator command (4,), as fractions of travel, that answers the state of that stamp (us)."""
     _put_command(wire, stamp_us, controls)
     return _send(wire, i, _append(wire, i, ACTUATORS, 0))
 
 
 @compiled_apart
 def send_attitude_target(wire, i, stamp_us, target):
-    """Send an attitude target (5,), see ``attitude_target.TARGET``, that answers the state of that stamp."""
+    """Send an `AttitudeTarget` (5,) that answers the state of that stamp (us)."""
     payload = wire.payload
     clear(payload)
     payload.words[0] = stamp_us // 1000
-    for n in range(4):
+    for n in range(_TARGET_THRUST):
         payload.floats[_TARGET_Q + n] = target[n]
-    payload.floats[_THRUST] = target[4]
+    payload.floats[_THRUST] = target[_TARGET_THRUST]
     payload.octets[_ATTITUDE_SYSTEM] = wire.system[i]
     payload.octets[_ATTITUDE_COMPONENT] = _SIMULATOR
     payload.octets[_ATTITUDE_MASK] = _NO_RATES
@@ -285,16 +289,17 @@ def send_attitude_target(wire, i, stamp_us, target):
 
 @compiled_apart
 def send_position_target(wire, i, target):
-    """Send a leader's target (stamp s, x, y, z, vx, vy, vz; z up) to its reference point; z is down on the wire."""
+    """Send a leader's `PositionTarget` (7,) to its reference point; on the wire z is down."""
+    sent = fields(PositionTarget, target)
     payload = wire.payload
     clear(payload)
-    payload.words[0] = round(target[0] * 1e6) // 1000
-    payload.floats[_TARGET_X] = target[1]
-    payload.floats[_TARGET_X + 1] = target[2]
-    payload.floats[_TARGET_X + 2] = -target[3]
-    payload.floats[_TARGET_VX] = target[4]
-    payload.floats[_TARGET_VX + 1] = target[5]
-    payload.floats[_TARGET_VX + 2] = -target[6]
+    payload.words[0] = round(sent.time * 1e6) // 1000
+    payload.floats[_TARGET_X] = sent.x
+    payload.floats[_TARGET_X + 1] = sent.y
+    payload.floats[_TARGET_X + 2] = -sent.z
+    payload.floats[_TARGET_VX] = sent.vx
+    payload.floats[_TARGET_VX + 1] = sent.vy
+    payload.floats[_TARGET_VX + 2] = -sent.vz
     payload.octets[_POSITION_SYSTEM] = wire.system[i]
     payload.octets[_POSITION_COMPONENT] = _SIMULATOR
     payload.octets[_FRAME] = _LOCAL_NED
@@ -304,12 +309,12 @@ def send_position_target(wire, i, target):
 
 @compiled_apart
 def read_state(wire, state, controls):
-    """The state in the datagram at hand.
+    """Read the state in the datagram at hand into ``state`` (13,), a `StateMessage`, and ``controls`` (4,).
 
     Returns
     -------
-    stamp, told : int
-        Its stamp in us, rounded down to whole ms (see ``timing.tick_of``), and whether the command in force came with
+    stamp, with_controls : int
+        Its stamp in us, rounded down to whole ms (see ``timing.tick_of``), and 1 where the command in force came with
         it; (-1, 0) if the datagram is anything but one state.
     """
     payload, end = wire.payload, wire.length[0]
@@ -317,20 +322,20 @@ def read_state(wire, state, controls):
     if number != ATTITUDE.number:
         return -1, 0
     milliseconds = np.int64(payload.words[0])
-    for n in range(7):
+    for n in range(_POSITION_AT):
         state[n] = payload.floats[_Q1 + n]
     number, at = read_frame(wire.datagram, at, end, payload)
     if number != POSITION.number or payload.words[0] != milliseconds:
         return -1, 0
-    for n in range(6):
-        state[7 + n] = payload.floats[_X + n]
+    for n in range(_STATE_WIDTH - _POSITION_AT):
+        state[_POSITION_AT + n] = payload.floats[_X + n]
     stamp = milliseconds * 1000
     if at == end:
         return stamp, 0
     number, at = read_frame(wire.datagram, at, end, payload)
     if number != ACTUATORS.number or payload.longs[0] // 1000 != milliseconds or at != end:
         return -1, 0
-    for n in range(4):
+    for n in range(_COMMANDS):
         controls[n] = payload.floats[_CONTROLS + n]
     return stamp, 1
 
@@ -344,36 +349,39 @@ def _read_alone(wire, shape):
 
 @compiled_apart
 def read_command(wire, controls):
-    """The actuator command in the datagram at hand: its stamp in us, or -1 if it is anything else."""
+    """Read an actuator command into ``controls`` (4,), fractions of travel: its stamp in us, -1 if it is none."""
     if not _read_alone(wire, ACTUATORS):
         return -1
-    for n in range(4):
+    for n in range(_COMMANDS):
         controls[n] = wire.payload.floats[_CONTROLS + n]
     return wire.payload.longs[0]
 
 
 @compiled_apart
 def read_attitude_target(wire, target):
-    """The attitude target in the datagram at hand: its stamp in us (whole ms), or -1 if it is anything else."""
+    """Read an `AttitudeTarget` into ``target`` (5,): its stamp in us (whole ms), -1 if it is none."""
     if not _read_alone(wire, ATTITUDE_TARGET):
         return -1
-    for n in range(4):
+    for n in range(_TARGET_THRUST):
         target[n] = wire.payload.floats[_TARGET_Q + n]
-    target[4] = wire.payload.floats[_THRUST]
+    target[_TARGET_THRUST] = wire.payload.floats[_THRUST]
     return np.int64(wire.payload.words[0]) * 1000
 
 
 @compiled_apart
 def read_position_target(wire, target):
-    """The leader's target in the datagram at hand: its stamp in us (whole ms), or -1 if it is anything else."""
+    """Read a leader's `PositionTarget` into ``target`` (7,): its stamp in us (whole ms), -1 if it is none."""
     if not _read_alone(wire, POSITION_TARGET):
         return -1
     payload = wire.payload
-    target[0] = np.int64(payload.words[0]) / 1e3
-    target[1] = payload.floats[_TARGET_X]
-    target[2] = payload.floats[_TARGET_X + 1]
-    target[3] = -payload.floats[_TARGET_X + 2]
-    target[4] = payload.floats[_TARGET_VX]
-    target[5] = payload.floats[_TARGET_VX + 1]
-    target[6] = -payload.floats[_TARGET_VX + 2]
+    received = PositionTarget(
+        time=np.int64(payload.words[0]) / 1e3,
+        x=np.float64(payload.floats[_TARGET_X]),
+        y=np.float64(payload.floats[_TARGET_X + 1]),
+        z=np.float64(-payload.floats[_TARGET_X + 2]),
+        vx=np.float64(payload.floats[_TARGET_VX]),
+        vy=np.float64(payload.floats[_TARGET_VX + 1]),
+        vz=np.float64(-payload.floats[_TARGET_VX + 2]),
+    )
+    store(received, target)
     return np.int64(payload.words[0]) * 1000

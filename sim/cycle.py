@@ -11,10 +11,14 @@ from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, compiled_apart, compiled_within, fields, fill, moved
+from ftcc.link.messages import PositionTarget
+from ftcc.sim.actuation import actuate as plant_actuate
+from ftcc.sim.actuation import has_autothrottle, hold_speed, stroke
+from ftcc.sim.disturbances import disturb, gust
+from ftcc.sim.faults import fault_in_force
 from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z, disturb, fault, gust, hold_speed, stroke
-from ftcc.sim.plant import actuate as plant_actuate
+from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z
 from ftcc.sim.sensors import add_noise, encode_state
 from ftcc.sim.wind import AIR, blow, moving_air
 
@@ -42,15 +46,15 @@ _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gu
 
 
 @compiled_within
-def _hold_speed(fleet, i):
-    if fleet.autothrottle[i, 0] > 0.0:
+def _set_autothrottle(fleet, i):
+    if has_autothrottle(fleet, i):
         hold_speed(fleet, i, _airspeed(fields(_State, fleet.state[i])))
 
 
 @compiled
 def actuate(fleet, i, time):
     """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; to be called after each latch."""
-    _hold_speed(fleet, i)
+    _set_autothrottle(fleet, i)
     plant_actuate(fleet, i, time)
 
 
@@ -89,7 +93,7 @@ def _disturb(fleet, i, time, out):
 @compiled
 def _step(fleet, i, parameters, time, h):
     """One step of RK4 of ``h`` (s) whose middle is at ``time`` (s)."""
-    _hold_speed(fleet, i)
+    _set_autothrottle(fleet, i)
     a0, a1, a2 = _stroke(fleet, i, 0, time, h)
     b0, b1, b2 = _stroke(fleet, i, 1, time, h)
     c0, c1, c2 = _stroke(fleet, i, 2, time, h)
@@ -137,16 +141,15 @@ def advance(fleet, i, start_us, period_us, step_us):
 @compiled
 def _point_truth(fleet, i, time, out):
     """A `reference_point` moves at constant velocity from the stamp of its target on."""
-    target = fleet.target[i]
-    since = time - target[0]
-    vx, vy, vz = target[4], target[5], target[6]
-    ground = math.sqrt(vx * vx + vy * vy)
-    out[X] = target[1] + vx * since
-    out[Y] = target[2] + vy * since
-    out[Z] = target[3] + vz * since
-    out[V] = math.sqrt(ground * ground + vz * vz)
-    out[GAMMA] = math.atan2(vz, ground)
-    out[CHI] = math.atan2(vy, vx)
+    target = fields(PositionTarget, fleet.target[i])
+    since = time - target.time
+    ground = math.sqrt(target.vx * target.vx + target.vy * target.vy)
+    out[X] = target.x + target.vx * since
+    out[Y] = target.y + target.vy * since
+    out[Z] = target.z + target.vz * since
+    out[V] = math.sqrt(ground * ground + target.vz * target.vz)
+    out[GAMMA] = math.atan2(target.vz, ground)
+    out[CHI] = math.atan2(target.vy, target.vx)
     out[THETA] = out[GAMMA]
 
 
@@ -166,7 +169,7 @@ def conditions(fleet, i, time, out):
     """Write what is wrong with vehicle ``i`` at ``time`` (s) into ``out``, in the order of `plants.conditions_of`."""
     count = len(_SLOTS)
     for n, slot in enumerate(_SLOTS):
-        out[n], out[count + n], _ = fault(fleet, i, slot, time)
+        out[n], out[count + n], _ = fault_in_force(fleet, i, slot, time)
     _disturb(fleet, i, time, out[2 * count :])
 
 
@@ -181,17 +184,18 @@ def measure(fleet, i, tick, seed, true, out):
 
 
 @compiled
-def sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
-    """Truth of vehicle ``i``, its state as the autopilot is told, and the command in force as fractions of travel.
+def sense(fleet, i, tick, now_us, seed, true, measured, state, controls):
+    """Sense vehicle ``i`` at tick ``tick``, simulated time ``now_us``; note the obstacle zones that it enters.
 
-    Written into ``true`` (13,), ``state`` (13,), see ``wire.STATE``, its altitude from the datum on, and ``controls``
-    (4,); ``seen`` (13,) is room.
+    Writes the truth into ``true`` (13,), see ``plant.TRUTH``, the same as measured into ``measured`` (13,), the message
+    to the autopilot into ``state`` (13,), see ``messages.StateMessage``, with the altitude above the datum, and the
+    command in force into ``controls`` (4,), as fractions of travel.
     """
     actuate(fleet, i, now_us / 1e6)
     truth(fleet, i, now_us / 1e6, true)
     watch(fleet.zones, fleet.entered, fleet.events, i, now_us, true[X], true[Z])
-    measure(fleet, i, tick, seed, true, seen)
-    seen[Z] -= fleet.datum[i]
-    encode_state(seen, state)
+    measure(fleet, i, tick, seed, true, measured)
+    measured[Z] -= fleet.datum[i]
+    encode_state(measured, state)
     navigate(fleet, i, now_us / 1e6, state)
     encode_command(fleet.command[i], fleet.travel[i], controls)

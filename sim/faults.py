@@ -1,93 +1,83 @@
-"""Failures of a vehicle, planned or asked for in flight: one way into the tables that the compiled functions read."""
+"""Actuator faults: effectiveness, bias, slow, stuck and intermittent actuators, and their onset."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from ftcc.link.compiled import compiled, compiled_within, fields
 
-from ftcc.link.actuators import SLOT
-from ftcc.link.failures import EVERY, Failure
-from ftcc.sim import navigation
-from ftcc.sim.navigation import NavigationFault
-from ftcc.sim.plant import INTERMITTENT, STUCK, Fault, Fleet
+__all__ = ["INTERMITTENT", "STUCK", "WRONG", "Fault", "fault_in_force", "healthy", "onset"]
 
-__all__ = ["SPARE", "faults_of", "inject"]
+_ROUNDING = 1e-9
+"""By how much a time may be short of the phase that it belongs to, s."""
 
-SPARE = 24
-"""Failures beyond the planned ones that a vehicle has room for."""
-
-_NAVIGATION_KINDS = {
-    "off": navigation.OFF,
-    "stuck": navigation.STUCK,
-    "slow": navigation.SLOW,
-    "intermittent": navigation.INTERMITTENT,
-}
-_OFFSETS = {
-    "SENSOR_GPS": ("FAIL_POS_N", "FAIL_POS_E", "FAIL_POS_D", "FAIL_VEL_N", "FAIL_VEL_E", "FAIL_VEL_D"),
-    "SENSOR_GYRO": ("FAIL_ROLL", "FAIL_PITCH", "FAIL_YAW", "FAIL_P", "FAIL_Q", "FAIL_R"),
-}
-_PARTS = {"SENSOR_GPS": navigation.POSITION, "SENSOR_GYRO": navigation.ATTITUDE}
+WRONG, STUCK, INTERMITTENT = range(3)
+"""Kinds of `Fault`."""
 
 
-def inject(fleet: Fleet, i: int, fault: Fault | NavigationFault, now: float) -> bool:
-    """From its time on (s, not before ``now``) the failure acts on vehicle ``i``.
+class Fault(NamedTuple):
+    """Columns of ``Fleet.faults``: from ``time`` on, the actuator acts as effectiveness * position + bias.
 
-    One of the same actuator or part and the same time is replaced. Returns False where there is no room left.
+    A `STUCK` actuator holds its deflection; an `INTERMITTENT` fault is absent for a share of each period.
     """
-    if isinstance(fault, Fault):
-        table, counts = fleet.faults[i], fleet.fault_count
-    else:
-        table, counts = fleet.navigation[i], fleet.navigation_count
-    rows = [row for row in table[: counts[i]] if (row[0], row[1]) != (fault[0], fault[1])]
-    rows = _without_the_superseded(rows, now)
-    if len(rows) == len(table):
-        return False
-    # Of several at one time the last one injected counts.
-    place = sum(1 for row in rows if row[0] <= fault.time)
-    rows = [*(row.copy() for row in rows[:place]), np.array(fault), *(row.copy() for row in rows[place:])]
-    table[:] = 0.0
-    table[:, 0] = math.inf
-    table[: len(rows)] = rows
-    counts[i] = len(rows)
-    return True
+
+    time: float
+    """s."""
+    actuator: float
+    """Its slot, see ``link.actuators.SLOT``."""
+    effectiveness: float
+    """1 = healthy, 0 = without effect."""
+    bias: float
+    """In the unit of the actuator."""
+    effectiveness_onset: float
+    """Rate of the exponential onset of the loss, 1/s; 0 = step."""
+    bias_onset: float
+    """Rate of the exponential onset of the bias, 1/s; 0 = step."""
+    kind: float = WRONG
+    slew: float = math.inf
+    """Fastest motion, rad/s or N/s; inf = no further limit."""
+    period: float = 1.0
+    """Of an intermittent fault, s."""
+    duty: float = 1.0
+    """Healthy share of each period, 0..1."""
 
 
-def _without_the_superseded(rows: list[NDArray[np.float64]], now: float) -> list[NDArray[np.float64]]:
-    """Leave out what has acted and acts no more."""
-    past = {row[1]: n for n, row in enumerate(rows) if row[0] <= now}
-    return [row for n, row in enumerate(rows) if row[0] > now or past[row[1]] == n]
+_TIME, _ACTUATOR = Fault._fields.index("time"), Fault._fields.index("actuator")
 
 
-def faults_of(fleet: Fleet, i: int, failure: Failure, time: float) -> list[Fault | NavigationFault]:
-    """What a failure that the ground asks for means to vehicle ``i``; empty where it has no such part."""
-    unit, kind, sizes = failure.meaning.unit, failure.meaning.kind, failure.sizes
-    if unit.name in _PARTS:
-        period, duty = sizes["FAIL_PERIOD"], sizes["FAIL_DUTY"]
-        fault = NavigationFault(time, _PARTS[unit.name], _NAVIGATION_KINDS.get(kind, navigation.WRONG), period, duty)
-        if kind == "wrong":
-            offsets = dict(zip(NavigationFault._fields[5:], (sizes[n] for n in _OFFSETS[unit.name]), strict=True))
-            fault = fault._replace(**offsets)
-        return [fault]
-    parts = unit.parts if failure.instance == EVERY else (unit.parts[failure.instance - 1],)
-    slots = [SLOT[part] for part in parts if fleet.travel[i, SLOT[part]] > 0.0]
-    return [_actuator_fault(kind, sizes, time, slot) for slot in slots]
+@compiled_within
+def onset(since, rate):
+    """Share, 0..1, of its full size that a fault or disturbance has ``since`` s after it began; ``rate`` in 1/s."""
+    return 1.0 if rate == 0.0 else 1.0 - math.exp(-rate * since)
 
 
-def _actuator_fault(kind: str, sizes: Mapping[str, float], time: float, slot: int) -> Fault:
-    healthy = Fault(time, slot, 1.0, 0.0, 0.0, 0.0)
-    lossy = healthy._replace(effectiveness=sizes["FAIL_EFF"], bias=sizes["FAIL_BIAS"])
-    match kind:
-        case "wrong":
-            return lossy._replace(effectiveness_onset=sizes["FAIL_EFF_RATE"], bias_onset=sizes["FAIL_BIAS_RATE"])
-        case "off":
-            return healthy._replace(effectiveness=0.0)
-        case "stuck":
-            return healthy._replace(kind=STUCK)
-        case "slow":
-            return healthy._replace(slew=sizes["FAIL_SLEW"])
-        case "intermittent":
-            return lossy._replace(kind=INTERMITTENT, period=sizes["FAIL_PERIOD"], duty=sizes["FAIL_DUTY"])
-    return healthy
+@compiled_within
+def healthy(since, period, duty):
+    """Whether an intermittent fault is absent ``since`` s after it began: for the share ``duty`` of each period (s)."""
+    return (since + _ROUNDING) % period < duty * period
+
+
+@compiled
+def fault_in_force(fleet, i, actuator, time):
+    """Effectiveness, bias and largest rate of an actuator of vehicle ``i`` at ``time`` (s), by its latest fault."""
+    latest = -1
+    for n in range(fleet.fault_count[i]):
+        if time - fleet.faults[i, n, _TIME] >= 0.0 and int(fleet.faults[i, n, _ACTUATOR]) == actuator:
+            latest = n
+    if latest < 0:
+        return 1.0, 0.0, fleet.rate[i, actuator]
+    fault = fields(Fault, fleet.faults[i, latest])
+    since = time - fault.time
+    kind = int(fault.kind)
+    if kind == STUCK:
+        if fleet.held_since[i, actuator] != fault.time:
+            fleet.held_since[i, actuator] = fault.time
+            fleet.held[i, actuator] = fleet.deflection[i, actuator]
+        return 0.0, fleet.held[i, actuator], fleet.rate[i, actuator]
+    fleet.held_since[i, actuator] = math.inf
+    if kind == INTERMITTENT and healthy(since, fault.period, fault.duty):
+        return 1.0, 0.0, fleet.rate[i, actuator]
+    effectiveness = 1.0 + (fault.effectiveness - 1.0) * onset(since, fault.effectiveness_onset)
+    bias = fault.bias * onset(since, fault.bias_onset)
+    return effectiveness, bias, min(fleet.rate[i, actuator], fault.slew)

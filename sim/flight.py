@@ -10,7 +10,8 @@ from typing import Any
 
 from ftcc.link.actuators import decode_command
 from ftcc.link.attitude_target import decode_target, path_of
-from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within, copy
+from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within, copy, fields, store
+from ftcc.link.messages import StateMessage
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
 from ftcc.link.system_calls import monotonic, pause, wait
@@ -28,8 +29,9 @@ from ftcc.link.wire import (
     send_again,
     send_state,
 )
+from ftcc.sim.actuation import latch
 from ftcc.sim.obstacles import clearance
-from ftcc.sim.plant import X, Z, latch
+from ftcc.sim.plant import X, Z
 
 __all__ = ["fly", "take", "tick"]
 
@@ -51,8 +53,8 @@ _BEHIND = 0.1
 
 
 @compiled_apart
-def _sense(fleet, i, tick, now_us, seed, true, seen, state, controls):
-    cycle.sense(fleet, i, tick, now_us, seed, true, seen, state, controls)
+def _sense(fleet, i, tick, now_us, seed, true, measured, state, controls):
+    cycle.sense(fleet, i, tick, now_us, seed, true, measured, state, controls)
 
 
 @compiled_apart
@@ -81,10 +83,10 @@ def tick(group, timing):
         if group.alive[i] == 1:
             state, controls = group.states[i], group.controls[i]
             now_us = _now(group, timing)
-            _sense(group.fleet, i, group.tick[0], now_us, timing.seed, group.true[i], group.seen, state, controls)
+            _sense(group.fleet, i, group.tick[0], now_us, timing.seed, group.true[i], group.measured, state, controls)
     for i in range(group.alive.shape[0]):
         if group.alive[i] == 1:
-            tell(group, timing, i)
+            transmit(group, timing, i)
     for i in range(group.alive.shape[0]):
         if group.alive[i] == 1:
             record(group, timing, i)
@@ -114,20 +116,21 @@ def bring_into_force(group, timing, i):
 
 
 @compiled_within
-def tell(group, timing, i):
-    """Send the state; with the command in force, unless it is the one that answers the last state."""
+def transmit(group, timing, i):
+    """Send the state of vehicle ``i``; with the command in force, unless it is the one that answers the last state."""
     now_us, state = _now(group, timing), group.states[i]
     if group.travels_by[i] == BY_ATTITUDE:
         n = group.tick[0] % group.paths.shape[1]
         group.path_stamps[i, n] = now_us
-        group.paths[i, n, 0], group.paths[i, n, 1], group.paths[i, n, 2] = path_of(state[10], state[11], state[12])
-    known = _answers_last(group, timing, i) and group.delays[i] == 0
-    send_state(group.wire, i, now_us, state, group.controls[i], not known)
+        sent = fields(StateMessage, state)
+        store(path_of(sent.vx, sent.vy, sent.vz), group.paths[i, n])
+    as_answered = _answers_last(group, timing, i) and group.delays[i] == 0
+    send_state(group.wire, i, now_us, state, group.controls[i], not as_answered)
 
 
 @compiled_within
-def _know(group, i, now_us, out):
-    """Write what only the simulator knows of vehicle ``i`` into ``out``, in the order of ``process.truth_array``."""
+def _write_truth(group, i, now_us, out):
+    """Write truth, commands, what acts and conditions of vehicle ``i`` into ``out``, see ``process.truth_array``."""
     commands = group.true.shape[1]
     acting = commands + group.controls.shape[1]
     copy(group.true[i], out)
@@ -144,7 +147,7 @@ def record(group, timing, i):
     now_us = _now(group, timing)
     row = group.rows.values[i, group.rows.filled[i]]
     row[0], row[1] = now_us / 1e6, float(group.fleet.uav[i])
-    _know(group, i, now_us, row[2:])
+    _write_truth(group, i, now_us, row[2:])
     if group.fleet.zones.shape[0] > 0:
         row[row.shape[0] - 1] = clearance(group.fleet.zones, group.true[i, X], group.true[i, Z])
     group.rows.filled[i] += 1
@@ -161,11 +164,11 @@ def fly_on(group, timing, i):
 
 
 @compiled_within
-def know(group, timing):
-    """Set ``known`` of the living after this tick, for the station."""
+def report_truth(group, timing):
+    """Set the truth reports of the living vehicles after this tick."""
     for i in range(group.alive.shape[0]):
         if group.alive[i] == 1:
-            _know(group, i, _now(group, timing), group.known[i])
+            _write_truth(group, i, _now(group, timing), group.truth_reports[i])
 
 
 # The flight of a vehicle process: ticks, and waiting for them.
@@ -296,7 +299,7 @@ def fly(group, timing, lockstep):
             group.since[0] = now
             work = something_to_do(group, timing)
             if work:
-                know(group, timing)
+                report_truth(group, timing)
             group.tick[0] += 1
             if work:
                 return WORK

@@ -9,15 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.link.attitude_target import TARGET
+from ftcc.link.actuators import ACTUATORS
 from ftcc.link.mavlink import SIMULATOR
+from ftcc.link.messages import AttitudeTarget, PositionTarget, StateMessage
 from ftcc.link.recording import Rows
-from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, STATE, Wire, new_wire
-from ftcc.sim.plant import TRUTH, Fleet
+from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, Wire, new_wire
+from ftcc.sim.build import build_fleet
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import conditions_of
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["PATHS", "VehicleGroup", "build_group", "knowledge_width"]
+__all__ = ["PATHS", "VehicleGroup", "build_group", "truth_report_width"]
 
 PATHS = 16
 """States whose path a vehicle remembers, for commands that come late."""
@@ -37,13 +40,13 @@ class VehicleGroup(NamedTuple):
     why: NDArray[np.int64]
     """(k,): why, a key of ``plant.LOST``."""
     lost: NDArray[np.int64]
-    """(1,): vehicles that were lost in flight and of which nobody was told yet."""
+    """(1,): vehicles lost in flight whose loss is not reported yet."""
     true: NDArray[np.float64]
-    """(k, 13): the states of this tick, in the order of ``TRUTH``."""
-    seen: NDArray[np.float64]
-    """(13,): room for one as measured."""
+    """(k, 13): the true states of this tick, in the order of ``plant.TRUTH``."""
+    measured: NDArray[np.float64]
+    """(13,): room for one of them as measured."""
     states: NDArray[np.float64]
-    """(k, 13): as the autopilots are told, see ``wire.STATE``."""
+    """(k, 13): the states as sent, see ``messages.StateMessage``."""
     controls: NDArray[np.float64]
     """(k, 4): the commands in force, fractions of travel."""
     travels_by: NDArray[np.int64]
@@ -53,7 +56,7 @@ class VehicleGroup(NamedTuple):
     received: NDArray[np.float64]
     """(k, 4): the newest commands: fractions of travel, or, if they come as attitude targets, rad, N, load factor."""
     targets: NDArray[np.float64]
-    """(k, 7): the newest targets of reference points."""
+    """(k, 7): the newest targets of reference points, see ``messages.PositionTarget``."""
     attitude: NDArray[np.float64]
     """(5,): room for an attitude target,"""
     target: NDArray[np.float64]
@@ -68,10 +71,10 @@ class VehicleGroup(NamedTuple):
     """(k, PATHS, 3): their speed, flight-path angle and course."""
     late: NDArray[np.int64]
     """(k,): ticks at which no command answered the state before."""
-    known: NDArray[np.float64]
-    """(k, n): what only the simulator knows, in the order of ``process.truth_array``, without the last."""
+    truth_reports: NDArray[np.float64]
+    """(k, n): the truth for the station, in the order of ``process.truth_array``, without the last."""
     truth_every: NDArray[np.int64]
-    """(1,): ticks between two looks whether the station is to be told the truth."""
+    """(1,): ticks between two times at which a truth report may be due."""
     tick: NDArray[np.int64]
     """(1,): the next one."""
     limit: NDArray[np.int64]
@@ -86,9 +89,9 @@ class VehicleGroup(NamedTuple):
     """(2,): for the clock, see `system_calls`."""
 
 
-def knowledge_width(plant: str) -> int:
-    """How many numbers only the simulator knows of a vehicle: truth, commands, what acts, conditions."""
-    return len(TRUTH) + 8 + len(conditions_of(plant))
+def truth_report_width(plant: str) -> int:
+    """Numbers in a row of ``VehicleGroup.truth_reports``: truth, commands, what acts, conditions."""
+    return len(TRUTH) + 2 * len(ACTUATORS) + len(conditions_of(plant))
 
 
 def _travels_by(spec: VehicleSpec) -> int:
@@ -98,31 +101,34 @@ def _travels_by(spec: VehicleSpec) -> int:
 
 
 def build_group(specs: Sequence[VehicleSpec], rows: Rows, truth_every: int) -> VehicleGroup:
-    """Arrays for ``specs``, which share one plant, before the first tick; ``truth_every`` ticks the station is told."""
+    """Arrays for ``specs``, which share one plant, before the first tick.
+
+    A truth report may be due every ``truth_every`` ticks.
+    """
     k = len(specs)
     return VehicleGroup(
-        fleet=build(specs),
+        fleet=build_fleet(specs),
         wire=new_wire([spec.uav for spec in specs], SIMULATOR),
         rows=rows,
         alive=np.ones(k, np.int64),
         why=np.zeros(k, np.int64),
         lost=np.zeros(1, np.int64),
         true=np.zeros((k, len(TRUTH))),
-        seen=np.zeros(len(TRUTH)),
-        states=np.zeros((k, len(STATE))),
-        controls=np.zeros((k, 4)),
+        measured=np.zeros(len(TRUTH)),
+        states=np.zeros((k, len(StateMessage._fields))),
+        controls=np.zeros((k, len(ACTUATORS))),
         travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
         delays=np.array([spec.delay for spec in specs], np.int64),
-        received=np.zeros((k, 4)),
-        targets=np.zeros((k, 7)),
-        attitude=np.zeros(len(TARGET)),
-        target=np.zeros(7),
-        latched=np.zeros(4),
+        received=np.zeros((k, len(ACTUATORS))),
+        targets=np.zeros((k, len(PositionTarget._fields))),
+        attitude=np.zeros(len(AttitudeTarget._fields)),
+        target=np.zeros(len(PositionTarget._fields)),
+        latched=np.zeros(len(ACTUATORS)),
         answered=np.full(k, -1, np.int64),
         path_stamps=np.full((k, PATHS), -1, np.int64),
         paths=np.zeros((k, PATHS, 3)),
         late=np.zeros(k, np.int64),
-        known=np.zeros((k, knowledge_width(specs[0].plant))),
+        truth_reports=np.zeros((k, truth_report_width(specs[0].plant))),
         truth_every=np.full(1, truth_every),
         tick=np.zeros(1, np.int64),
         limit=np.full(1, _NEVER),

@@ -1,6 +1,6 @@
-"""Failures of the navigation solution: what a vehicle reports of its position and attitude where GPS or gyros fail.
+"""Navigation faults: what a vehicle reports of its position and attitude when GPS or gyros fail.
 
-They act on the fields of the two state messages, behind noise. Whatever fails, the fields stay numbers.
+They act on the fields of the two state messages, behind noise. Whatever fails, the fields stay finite.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftcc.link.compiled import compiled
-from ftcc.sim.plant import healthy
+from ftcc.link.compiled import compiled, fields, store
+from ftcc.link.messages import StateMessage
+from ftcc.sim.faults import healthy
 
 __all__ = ["ATTITUDE", "INTERMITTENT", "OFF", "POSITION", "SLOW", "STUCK", "WRONG", "NavigationFault", "navigate"]
 
 POSITION, ATTITUDE = range(2)
-"""What fails: position and velocity, or attitude and rates."""
+"""What fails, the part of a `NavigationFault`: position and velocity, or attitude and rates."""
 
 WRONG, OFF, STUCK, SLOW, INTERMITTENT = range(5)
 """Kinds of `NavigationFault`."""
@@ -24,9 +25,12 @@ WRONG, OFF, STUCK, SLOW, INTERMITTENT = range(5)
 _ROUNDING = 1e-9
 """By how much a number of periods may be short of a whole one."""
 
-_FIRST = (7, 0)
+_ATTITUDE, _RATES, _POSITION, _VELOCITY = (StateMessage._fields.index(name) for name in ("q1", "rollspeed", "x", "vx"))
+"""Where they begin in a `StateMessage`."""
+_FIRST = (_POSITION, _ATTITUDE)
 """The first field of the message that fails, by what fails."""
-_LAST = (13, 7)
+_END = (len(StateMessage._fields), _POSITION)
+"""Behind the last one."""
 
 
 class NavigationFault(NamedTuple):
@@ -54,92 +58,102 @@ class NavigationFault(NamedTuple):
     """Offsets of velocity north, east, down (m/s), or of the rates p, q, r (rad/s)."""
 
 
-@compiled
-def _turn(message, roll, pitch, yaw):
-    """Turn the attitude of ``message`` by small angles about the body's axes, one after the other."""
-    for axis in range(3):
-        angle = 0.5 * (yaw if axis == 0 else pitch if axis == 1 else roll)
-        c, s = math.cos(angle), math.sin(angle)
-        q0, q1, q2, q3 = message[0], message[1], message[2], message[3]
-        if axis == 0:
-            message[0], message[1], message[2], message[3] = (
-                c * q0 - s * q3,
-                c * q1 + s * q2,
-                c * q2 - s * q1,
-                c * q3 + s * q0,
-            )
-        elif axis == 1:
-            message[0], message[1], message[2], message[3] = (
-                c * q0 - s * q2,
-                c * q1 - s * q3,
-                c * q2 + s * q0,
-                c * q3 + s * q1,
-            )
-        else:
-            message[0], message[1], message[2], message[3] = (
-                c * q0 - s * q1,
-                c * q1 + s * q0,
-                c * q2 + s * q3,
-                c * q3 - s * q2,
-            )
+_TIME, _PART = NavigationFault._fields.index("time"), NavigationFault._fields.index("part")
 
 
 @compiled
-def _wrong(message, part, fault):
+def _turned(q0, q1, q2, q3, axis, angle):
+    """The attitude quaternion turned by ``angle`` (rad) about the body's axis 0, 1 or 2."""
+    c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+    if axis == 0:
+        return c * q0 - s * q1, c * q1 + s * q0, c * q2 + s * q3, c * q3 - s * q2
+    if axis == 1:
+        return c * q0 - s * q2, c * q1 - s * q3, c * q2 + s * q0, c * q3 + s * q1
+    return c * q0 - s * q3, c * q1 + s * q2, c * q2 - s * q1, c * q3 + s * q0
+
+
+@compiled
+def _offset(message, part, fault):
+    """Add the offsets of a wrong navigation solution; an attitude is turned by yaw, pitch and roll, in this order."""
+    offsets = (fault.first, fault.second, fault.third)
+    rates = (fault.first_rate, fault.second_rate, fault.third_rate)
     if part == POSITION:
-        for n in range(6):
-            message[7 + n] += fault[5 + n]
-    else:
-        _turn(message, fault[5], fault[6], fault[7])
-        for n in range(3):
-            message[4 + n] += fault[8 + n]
+        for n in range(len(offsets)):
+            message[_POSITION + n] += offsets[n]
+            message[_VELOCITY + n] += rates[n]
+        return
+    roll, pitch, yaw = offsets
+    sent = fields(StateMessage, message)
+    q1, q2, q3, q4 = _turned(sent.q1, sent.q2, sent.q3, sent.q4, 2, yaw)
+    q1, q2, q3, q4 = _turned(q1, q2, q3, q4, 1, pitch)
+    store(_turned(q1, q2, q3, q4, 0, roll), message[_ATTITUDE:_RATES])
+    for n in range(len(rates)):
+        message[_RATES + n] += rates[n]
 
 
 @compiled
-def _updated(fleet, i, part, kind, since, fault):
-    """Whether a solution that is not right all the time is fresh at this tick."""
+def _is_fresh(fleet, i, part, fault, since):
+    """Whether a slow or intermittent solution is fresh at this tick, ``since`` s after its fault began."""
     if fleet.fresh[i, part] < 0.0:
         return True  # there is nothing yet that could be held
-    if kind == SLOW:
-        count = int(since / fault[3] + _ROUNDING)
+    if fault.kind == SLOW:
+        count = int(since / fault.period + _ROUNDING)
         if count != fleet.updates[i, part]:
             fleet.updates[i, part] = count
             return True
         return False
-    return kind == INTERMITTENT and healthy(since, fault[3], fault[4])
+    return fault.kind == INTERMITTENT and healthy(since, fault.period, fault.duty)
 
 
 @compiled
 def _keep(fleet, i, part, time, message):
-    for n in range(_FIRST[part], _LAST[part]):
+    """Remember a fresh solution, to be held later."""
+    for n in range(_FIRST[part], _END[part]):
         fleet.solution[i, n] = message[n]
     fleet.fresh[i, part] = time
 
 
 @compiled
+def _hold(fleet, i, part, time, kind, message):
+    """Replace what fails by the last fresh solution; `OFF`: by dead reckoning, or the attitude held without rates."""
+    for n in range(_FIRST[part], _END[part]):
+        message[n] = fleet.solution[i, n]
+    if kind == OFF:
+        for n in range(3):
+            if part == POSITION:
+                message[_POSITION + n] += message[_VELOCITY + n] * (time - fleet.fresh[i, part])
+            else:
+                message[_RATES + n] = 0.0
+
+
+@compiled
+def _latest(fleet, i, part, time):
+    """Row of the navigation fault of ``part`` in force at ``time`` (s); -1 where there is none."""
+    latest = -1
+    for n in range(fleet.navigation_count[i]):
+        if time - fleet.navigation[i, n, _TIME] >= 0.0 and int(fleet.navigation[i, n, _PART]) == part:
+            latest = n
+    return latest
+
+
+@compiled
 def navigate(fleet, i, time, message):
-    """What becomes of the state messages' fields (13,) of vehicle ``i`` at ``time`` (s) where its navigation fails."""
+    """Apply the navigation faults of vehicle ``i`` at ``time`` (s) to its `StateMessage` (13,), in place."""
     for part in range(2):
-        latest = -1
-        for n in range(fleet.navigation_count[i]):
-            if time - fleet.navigation[i, n, 0] >= 0.0 and int(fleet.navigation[i, n, 1]) == part:
-                latest = n
-        kind = int(fleet.navigation[i, latest, 2]) if latest >= 0 else WRONG
+        latest = _latest(fleet, i, part, time)
+        if latest < 0:
+            _keep(fleet, i, part, time, message)
+            fleet.updates[i, part] = 0
+            continue
+        fault = fields(NavigationFault, fleet.navigation[i, latest])
+        kind = int(fault.kind)
         if kind == WRONG:
             _keep(fleet, i, part, time, message)
             fleet.updates[i, part] = 0
-            if latest >= 0:
-                _wrong(message, part, fleet.navigation[i, latest])
-        elif _updated(fleet, i, part, kind, time - fleet.navigation[i, latest, 0], fleet.navigation[i, latest]):
+            _offset(message, part, fault)
+        elif _is_fresh(fleet, i, part, fault, time - fault.time):
             _keep(fleet, i, part, time, message)
         else:
-            for n in range(_FIRST[part], _LAST[part]):
-                message[n] = fleet.solution[i, n]
-            if kind == OFF:
-                for n in range(3):
-                    if part == POSITION:
-                        message[7 + n] += message[10 + n] * (time - fleet.fresh[i, part])
-                    else:
-                        message[4 + n] = 0.0
+            _hold(fleet, i, part, time, kind, message)
     for n in range(message.shape[0]):
         message[n] = float(np.float32(message[n]))

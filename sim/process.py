@@ -1,7 +1,7 @@
 """The vehicle process: flies one or several vehicles and speaks MAVLink with their autopilots.
 
 At tick k a vehicle latches the command that answers state k-1, sends state k, and flies on to k+1: in compiled code,
-see `flight`. Here is what happens beside the ticks: failures that are injected, the recording, the station, the
+see `flight`. This file does the work beside the ticks: failures that are injected, the recording, the station, the
 launcher. In lockstep a vehicle waits for the command; on the wall clock it holds the last one where a new one is late.
 """
 
@@ -24,8 +24,8 @@ from ftcc.link.recording import Column, Recorder, is_full, part_path
 from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, HELD, WORK
 from ftcc.link.wire import connect, keep_sent, send_again, split
-from ftcc.sim.faults import faults_of, inject
 from ftcc.sim.group import VehicleGroup, build_group
+from ftcc.sim.injection import faults_of, inject
 from ftcc.sim.obstacles import entered_text
 from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS
 from ftcc.sim.plants import conditions_of, find, flight_of
@@ -55,7 +55,7 @@ def columns(plant: str, obstacles: bool = False) -> tuple[Column, ...]:
 
 
 def places(plant: str, obstacles: bool = False) -> tuple[int, ...]:
-    """Where the numbers of `columns` stand in a row as it is filled, which has all slots of the actuators."""
+    """Where the numbers of `columns` stand in a row as it is filled: such a row has all slots of the actuators."""
     slots = [SLOT[name] for name in by_slot(find(plant).ACTUATORS)]
     commands = 2 + len(TRUTH)
     acting, conditions = commands + len(ACTUATORS), commands + 2 * len(ACTUATORS)
@@ -148,16 +148,16 @@ class Vehicles:
             if self.tick != flown:
                 flown = self.tick
                 self.stall.progress()
-            self.complain()
-            self.follow_the_gate()
+            self.report_stall()
+            self.apply_gate()
             cause = self._fly(self.group, self.timing, self.setting.lockstep)
         self.recorder.close()
         late = int(self.group.late.sum())
         self.gate.tell(Ended(self.tick, late, self.tick * len(self.specs)))
         self.gate.wait_until_released(60.0)
 
-    def follow_the_gate(self) -> None:
-        """Bring limit and pace into the compiled flight."""
+    def apply_gate(self) -> None:
+        """Give the compiled flight the limit and the pace."""
         limit = self.gate.limit
         self.group.limit[0] = _NO_LIMIT if limit is None else limit
         pace = self.gate.take_pace()
@@ -167,39 +167,39 @@ class Vehicles:
         self.group.attention[0] = time.monotonic() + _ATTENTION
 
     def hold(self) -> None:
-        """Tell the launcher, once, that this process is held."""
+        """Report to the launcher, once, that this process is held."""
         self.gate.hold(self.tick)
         self.stall.progress()
 
-    def complain(self) -> None:
-        """Say for whom this process waits, where it has waited for long."""
+    def report_stall(self) -> None:
+        """Report for which UAVs this process waits, where it has waited for long."""
         if self.setting.lockstep and self.stall.long:
             wanted = self.now_us - self.timing.period_us
             missing = [i for i in range(len(self.specs)) if self.group.alive[i] and self.group.answered[i] < wanted]
             names = ", ".join(str(self.specs[i].uav) for i in missing)
             self.gate.tell(Said("warning", f"vehicles wait for commands of UAV {names} at tick {self.tick}"))
 
-    # What is not of a tick.
+    # Beside the ticks.
 
     def take_datagram(self) -> None:
-        """Take in the datagram at hand, which only pymavlink reads."""
+        """Take in the datagram at hand, which compiled code cannot read."""
         wire = self.group.wire
         i = int(wire.whose[0])
-        sizes = None
-        """What may be the first half of a failure."""
+        before = None
+        """The message before this one: it may hold the sizes of a failure."""
         for message in split(wire, self.pilots[i].codec):
             if message is None:
                 self.flight.take(self.group, self.timing, i)
             elif ends(message):
                 self.lose(i, DIVERGED, self.now_us - self.timing.period_us)
             else:
-                failure, at_us = read_failure([sizes, message]) if sizes is not None else (None, 0)
+                failure, at_us = read_failure([before, message]) if before is not None else (None, 0)
                 if failure is not None:
-                    self.fail(i, failure, at_us)
-            sizes = message
+                    self.inject(i, failure, at_us)
+            before = message
 
-    def fail(self, i: int, failure: Failure, at_us: int) -> None:
-        """Arm a failure, at a simulated time or (0) at once, and answer the autopilot."""
+    def inject(self, i: int, failure: Failure, at_us: int) -> None:
+        """Make faults of a failure, which begin at a simulated time (us) or, for 0, at once; answer the autopilot."""
         fleet = self.group.fleet
         at_us = at_us or self.now_us
         faults = faults_of(fleet, i, failure, at_us / 1e6)
@@ -213,10 +213,10 @@ class Vehicles:
             result = dialect.MAV_RESULT_TEMPORARILY_REJECTED
         self.pilots[i].send(failure_answer(self.specs[i].uav, result, at_us))
 
-    # What is to be done after a tick.
+    # After a tick.
 
     def work(self, tick: int) -> None:
-        """Write rows, tell what happened, send the truth to the station."""
+        """Write rows, report events and losses, send the truth to the station."""
         now_us = tick * self.timing.period_us
         if is_full(self.recorder.rows):
             self.recorder.write()
@@ -229,26 +229,26 @@ class Vehicles:
         if self.group.lost[0]:
             for i in range(len(self.specs)):
                 if self.group.why[i] and not self.group.alive[i]:
-                    self.tell_lost(i, int(self.group.why[i]), now_us + self.timing.period_us)
+                    self.report_lost(i, int(self.group.why[i]), now_us + self.timing.period_us)
             self.group.lost[0] = 0
         if self.telemetry.due(tick):
-            self.tell_station(now_us)
+            self.report_truth(now_us)
 
-    def tell_station(self, now_us: int) -> None:
+    def report_truth(self, now_us: int) -> None:
         """Send the truth of all living vehicles to the station."""
         for i in range(len(self.specs)):
             if self.group.alive[i]:
-                truth = [*self.group.known[i].tolist(), float(self.group.late[i])]
+                truth = [*self.group.truth_reports[i].tolist(), float(self.group.late[i])]
                 self.station[i].send(float_array(now_us, "truth", truth))
 
     def lose(self, i: int, why: int, at_us: int) -> None:
-        """Vehicle ``i`` is lost: fly it no more."""
+        """Vehicle ``i`` is lost: stop flying it, and report why, a key of ``plant.LOST``."""
         if self.group.alive[i]:
             self.group.alive[i] = 0
-            self.tell_lost(i, why, at_us)
+            self.report_lost(i, why, at_us)
 
-    def tell_lost(self, i: int, why: int, at_us: int) -> None:
-        """Tell a loss to the autopilot, again wherever it asks, and to the launcher."""
+    def report_lost(self, i: int, why: int, at_us: int) -> None:
+        """Report a loss to the autopilot, again whenever it asks, and to the launcher."""
         self.group.why[i] = 0
         self.recorder.write()
         datagram = self.pilots[i].pack(ending_message())

@@ -1,12 +1,12 @@
-"""What a vehicle reports: measurement noise and the state as MAVLink carries it."""
+"""Measurement noise, and the measured state as MAVLink carries it."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ftcc.link.compiled import compiled, copy
+from ftcc.link.actuators import as_sent
+from ftcc.link.compiled import compiled, copy, store
+from ftcc.link.messages import StateMessage
 from ftcc.link.philox import NOISE, gaussian_pair, philox
 from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, P, Q, R, V, X, Y, Z
@@ -18,9 +18,9 @@ _CHANNELS = len(TRUTH)
 
 @compiled
 def add_noise(true, deviation, seed, uav, tick, out):
-    """``true`` (order of `TRUTH`) with white noise of the given standard deviations, drawn for this tick.
+    """Write ``true`` (13,), in the order of `TRUTH`, with white noise drawn for this tick into ``out`` (13,).
 
-    Returns whether there is any.
+    ``deviation`` (13,) holds the standard deviations. Returns whether there is any noise.
     """
     copy(true, out)
     noisy = False
@@ -39,18 +39,26 @@ def add_noise(true, deviation, seed, uav, tick, out):
 
 @compiled
 def encode_state(measured, out):
-    """Turn ``measured`` (order of `TRUTH`) into the fields of ``wire.STATE``, rounded to float32 as on the wire.
+    """Write ``measured`` (13,), in the order of `TRUTH`, as a `StateMessage` into ``out`` (13,), rounded to float32.
 
-    Attitude as `body_attitude` has it; north-east-down.
+    The attitude is that of `body_attitude`; position and velocity are north, east, down.
     """
     cos_gamma = math.cos(measured[GAMMA])
-    out[0], out[1], out[2], out[3] = body_attitude(
-        measured[CHI], measured[GAMMA], measured[MU], measured[ALPHA], measured[BETA]
+    q1, q2, q3, q4 = body_attitude(measured[CHI], measured[GAMMA], measured[MU], measured[ALPHA], measured[BETA])
+    message = StateMessage(
+        q1=q1,
+        q2=q2,
+        q3=q3,
+        q4=q4,
+        rollspeed=measured[P],
+        pitchspeed=measured[Q],
+        yawspeed=measured[R],
+        x=measured[X],
+        y=measured[Y],
+        z=-measured[Z],
+        vx=measured[V] * cos_gamma * math.cos(measured[CHI]),
+        vy=measured[V] * cos_gamma * math.sin(measured[CHI]),
+        vz=-measured[V] * math.sin(measured[GAMMA]),
     )
-    out[4], out[5], out[6] = measured[P], measured[Q], measured[R]
-    out[7], out[8], out[9] = measured[X], measured[Y], -measured[Z]
-    out[10] = measured[V] * cos_gamma * math.cos(measured[CHI])
-    out[11] = measured[V] * cos_gamma * math.sin(measured[CHI])
-    out[12] = -measured[V] * math.sin(measured[GAMMA])
-    for i in range(13):
-        out[i] = float(np.float32(out[i]))
+    store(message, out)
+    as_sent(out)

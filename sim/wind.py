@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.link.compiled import compiled, compiled_within
+from ftcc.link.compiled import compiled, compiled_within, fields
 from ftcc.link.philox import TURBULENCE, gaussian_pair, philox
 from ftcc.link.rotation import body_axes
 
@@ -69,14 +69,29 @@ class Turbulence(NamedTuple):
 NO_TURBULENCE = Turbulence()
 
 
+class DrydenFilter(NamedTuple):
+    """Columns of ``Fleet.dryden``: the exact discrete form of the filters of one component, see `dryden`."""
+
+    deviation: float
+    """sigma, m/s."""
+    decay: float
+    feed: float
+    l11: float
+    l21: float
+    l22: float
+
+
+_ALONG, _DEVIATION = DiscreteGust._fields.index("along"), DrydenFilter._fields.index("deviation")
+
+
 def dryden(turbulence: Turbulence) -> NDArray[np.float64]:
-    """The exact discrete form of the filters: a row (sigma, decay, feed, l11, l21, l22) per component.
+    """The exact discrete form of the filters, (3, 6): a `DrydenFilter` per component.
 
     With a = V/L and white noise n: z' = -a z + sqrt(2 a) n, r' = a (z - r), both with a stationary z of variance 1. The
     air moves by sigma z along the track, spectrum 1/(1 + (L w/V)^2), and by sigma (sqrt(3) z + (1 - sqrt(3)) r)/sqrt(2)
     across, spectrum (1 + 3 (L w/V)^2)/(1 + (L w/V)^2)^2. Over a step z and r get noise of the covariance l l^T.
     """
-    rows = np.zeros((3, 6))
+    rows = np.zeros((len(AIR), len(DrydenFilter._fields)))
     for n, (deviation, bandwidth) in enumerate(zip(turbulence.deviation, turbulence.bandwidth, strict=True)):
         turn = bandwidth * turbulence.step_us / 1e6
         # Integrals of 2 exp(-2 t) times 1, t and t^2 up to `turn`, without the cancellation of their closed forms.
@@ -84,7 +99,8 @@ def dryden(turbulence: Turbulence) -> NDArray[np.float64]:
         l11 = math.sqrt(first)
         l21 = mixed / l11
         decay = math.exp(-turn)
-        rows[n] = deviation, decay, turn * decay, l11, l21, math.sqrt(max(second - l21 * l21, 0.0))
+        l22 = math.sqrt(max(second - l21 * l21, 0.0))
+        rows[n] = DrydenFilter(deviation, decay, turn * decay, l11, l21, l22)
     return rows
 
 
@@ -99,8 +115,8 @@ def _tail(terms: int, y: float) -> float:
 
 def settled(turbulence: Turbulence, uav: int) -> NDArray[np.float64]:
     """States (3, 2) at the start, drawn from their stationary distribution: var z = 1, var r = cov(z, r) = 1/2."""
-    draws = _normal(turbulence.seed, 0, uav)
-    return np.array([(z, 0.5 * z + 0.5 * r) for z, r in (draws[0:2], draws[2:4], draws[4:6])])
+    draws = np.array(_normal(turbulence.seed, 0, uav)).reshape(len(AIR), 2)
+    return np.array([(z, 0.5 * z + 0.5 * r) for z, r in draws.tolist()])
 
 
 @compiled
@@ -116,9 +132,10 @@ def _normal(seed, draw, uav):
 
 @compiled_within
 def _drive(state, row, first, second):
-    z = state[0]
-    state[0] = row[1] * z + row[3] * first
-    state[1] = row[1] * state[1] + row[2] * z + row[4] * first + row[5] * second
+    """Move the states z and r of a filter on by a step, driven by two standard normal numbers."""
+    z, step = state[0], fields(DrydenFilter, row)
+    state[0] = step.decay * z + step.l11 * first
+    state[1] = step.decay * state[1] + step.feed * z + step.l21 * first + step.l22 * second
 
 
 @compiled
@@ -141,17 +158,14 @@ def moving_air(fleet, i, component, time):
     """How fast the air moves at vehicle ``i`` and ``time`` (s): a component, see `AIR`, m/s."""
     speed = 0.0
     for n in range(fleet.gusts.shape[1]):
-        row = fleet.gusts[i, n]
-        if time >= row[0]:
-            grown = _cosine(time - row[0], row[1])
-            if time >= row[5]:
-                grown = 1.0 - _cosine(time - row[5], row[1])
-            speed += row[2 + component] * grown
-    deviation, z, r = (
-        fleet.dryden[i, component, 0],
-        fleet.turbulence[i, component, 0],
-        fleet.turbulence[i, component, 1],
-    )
+        gust = fields(DiscreteGust, fleet.gusts[i, n])
+        if time >= gust.time:
+            grown = _cosine(time - gust.time, gust.rise)
+            if time >= gust.until:
+                grown = 1.0 - _cosine(time - gust.until, gust.rise)
+            speed += fleet.gusts[i, n, _ALONG + component] * grown
+    deviation = fleet.dryden[i, component, _DEVIATION]
+    z, r = fleet.turbulence[i, component, 0], fleet.turbulence[i, component, 1]
     if deviation > 0.0:
         if component > 0:
             z = (math.sqrt(3.0) * z + (1.0 - math.sqrt(3.0)) * r) / math.sqrt(2.0)

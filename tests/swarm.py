@@ -27,7 +27,10 @@ from ftcc.link.channel import Channel, Inbox
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim.airframe import Airframe
-from ftcc.sim.plant import TRUTH, Disturbance, Fault, Fleet, Guards
+from ftcc.sim.disturbances import Disturbance
+from ftcc.sim.faults import Fault
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.plant import TRUTH, Guards
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.spec import VehicleSpec
 

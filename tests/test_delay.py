@@ -14,10 +14,10 @@ from ftcc.link.gate import Ended, Gate, Go, Limit, Pace, Release
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, STATION, Endpoint
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
+from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.process import Vehicles
-from ftcc.sim.spec import build
 from tests.pymavlink_wire import command_message, read_state
 from tests.swarm import TRIM, Swarm, timing, vehicle
 
@@ -68,7 +68,7 @@ def test_every_command_differs_from_its_neighbours_so_that_the_delay_shows(fligh
 def test_the_aircraft_flies_each_period_under_the_command_in_force(flight):
     """From the recorded state at tick k, under the recorded command, the plant alone reaches the state at tick k+1."""
     states = flight.recording.truth[:, :, [TRUTH.index(name) for name in ("V", "x", "z", "gamma", "theta", "q")]]
-    alone = build([vehicle()])
+    alone = build_fleet([vehicle()])
     for k in range(len(states) - 1):
         for i in range(6):
             alone.state[0] = states[k, i]
@@ -148,7 +148,7 @@ def test_a_vehicle_process_latches_at_tick_k_the_answer_to_state_k_minus_1(tmp_p
     assert np.array_equal(told[0], np.float32([0.0, TRIM[ELEVATOR] / 0.7, 0.0, TRIM[THRUST] / 40.0]))
     assert [tick for tick, force in told.items() if force is not None] == [0]
     # And the aircraft flew under just these commands.
-    alone = build([vehicle()])
+    alone = build_fleet([vehicle()])
     for tick in range(ticks):
         if tick > 0:
             alone.command[0] = answer(tick - 1) * [0.0, 0.7, 0.0, 40.0]

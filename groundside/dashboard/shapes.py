@@ -10,8 +10,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from ftcc.groundside.palette import Color
+from ftcc.link.messages import StateMessage
 from ftcc.link.rotation import body_attitude, body_axes, quaternion_product
-from ftcc.link.wire import STATE
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.sensors import encode_state
 
@@ -46,7 +46,7 @@ class Poses:
     """Where an aircraft is drawn, and how it lies in the air there."""
 
     def __init__(self) -> None:
-        self._message = np.zeros(len(STATE))
+        self._message = np.zeros(len(StateMessage._fields))
 
     def of(
         self,

@@ -11,8 +11,8 @@ from ftcc.groundside.scenario.trims import disturbances_at, instants, level_trim
 from ftcc.groundside.schema import FaultFields, Plan
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import navigation
+from ftcc.sim.faults import INTERMITTENT, STUCK, WRONG, Fault
 from ftcc.sim.navigation import NavigationFault
-from ftcc.sim.plant import INTERMITTENT, STUCK, WRONG, Fault
 from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["actuator_faults", "check_ends", "check_faults", "fault_texts", "navigation_faults"]

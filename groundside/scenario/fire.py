@@ -22,7 +22,8 @@ from ftcc.groundside.scenario.trims import truth_at_start
 from ftcc.groundside.schema import Plan
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import plants
-from ftcc.sim.plant import CHI, GAMMA, Fault, V
+from ftcc.sim.faults import Fault
+from ftcc.sim.plant import CHI, GAMMA, V
 from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["check_posts", "fire_commands", "fire_texts", "posts"]

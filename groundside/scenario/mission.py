@@ -50,8 +50,9 @@ from ftcc.link.actuators import THRUST
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
+from ftcc.sim.disturbances import CALM
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.spec import CALM, VehicleSpec
+from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import NO_TURBULENCE
 
 __all__ = ["Mission", "resolve"]

@@ -8,7 +8,7 @@ from types import ModuleType
 from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.schema import Plan, TurbulenceFields
 from ftcc.link.timing import Timing
-from ftcc.sim.plant import Disturbance, Gust
+from ftcc.sim.disturbances import Disturbance, Gust
 from ftcc.sim.wind import AIR, NO_TURBULENCE, DiscreteGust, Turbulence
 
 __all__ = ["check_wind", "discrete_gusts", "gust", "low_altitude", "mean_wind", "turbulence", "wind_texts"]

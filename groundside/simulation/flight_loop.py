@@ -18,16 +18,18 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, as_sent, decode_command, encode_command
-from ftcc.link.attitude_target import TARGET, decode_target, encode_target
+from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import LINK_REPORT, Inbox, report_link
 from ftcc.link.compiled import compiled, copy, fill
 from ftcc.link.exchange import Exchange, new_exchange, newest_slot
+from ftcc.link.messages import AttitudeTarget, StateMessage
 from ftcc.link.timing import Timing, ticks_a_second
-from ftcc.link.wire import STATE
+from ftcc.sim.actuation import latch
+from ftcc.sim.build import build_fleet
+from ftcc.sim.fleet import Fleet
 from ftcc.sim.obstacles import watch
-from ftcc.sim.plant import DIVERGED, TRUTH, Fleet, X, Z, latch
+from ftcc.sim.plant import DIVERGED, TRUTH, X, Z
 from ftcc.sim.spec import VehicleSpec
-from ftcc.sim.spec import build as build_vehicles
 
 __all__ = ["Recording", "World", "fly_ticks", "new_recording", "new_world"]
 
@@ -123,7 +125,7 @@ class World(NamedTuple):
     recording: Recording
     true: NDArray[np.float64]
     """(k, 13): the states of this tick."""
-    seen: NDArray[np.float64]
+    measured: NDArray[np.float64]
     """(13,): room for one as measured."""
     state: NDArray[np.float64]
     """(13,): room for one as a message carries it."""
@@ -152,17 +154,17 @@ def new_world(
     last = (timing.ticks + 1 if room is None else room) - 1
     rows, reports = last // timing.record_every + 1, last // timing.report_every + 1
     return World(
-        fleet=build_vehicles(vehicles),
+        fleet=build_fleet(vehicles),
         autopilots=autopilots,
         inbox=inbox,
         events=link_events(specs),
         exchange=new_exchange(uavs, senders, inbox.valid.shape[1], values),
         recording=new_recording(rows, reports, widths, inbox.valid.shape),
         true=np.zeros((len(uavs), len(TRUTH))),
-        seen=np.zeros(len(TRUTH)),
-        state=np.zeros(len(STATE)),
+        measured=np.zeros(len(TRUTH)),
+        state=np.zeros(len(StateMessage._fields)),
         controls=np.zeros(len(ACTUATORS)),
-        target=np.zeros(len(TARGET)),
+        target=np.zeros(len(AttitudeTarget._fields)),
     )
 
 
@@ -191,7 +193,7 @@ def _tick_by_wire(world, timing, n):
         if lost[i] == 0:
             if n > 0:
                 _bring_into_force(world, i)
-            _state_of(world.fleet, i, n, now, timing.seed, world.true[i], world.seen, world.state, world.controls)
+            _state_of(world.fleet, i, n, now, timing.seed, world.true[i], world.measured, world.state, world.controls)
             _sense(autopilots, i, world.state, world.controls, now)
     for i in range(lost.shape[0]):
         if lost[i] == 0:
@@ -214,10 +216,10 @@ def _ideal_tick(world, timing, n):
         fleet, true = world.fleet, world.true[i]
         _truth(fleet, i, now / 1e6, true)
         watch(fleet.zones, fleet.entered, fleet.events, i, now, true[X], true[Z])
-        _measure(fleet, i, n, timing.seed, true, world.seen)
+        _measure(fleet, i, n, timing.seed, true, world.measured)
         own = autopilots.own[i]
         own[0] = now / 1e6
-        copy(world.seen, own[1:])
+        copy(world.measured, own[1:])
         copy(fleet.command[i], own[_OWN_COMMAND:])
         if autopilots.leader[i] == 1:
             # Leaders hear each other's records up to the tick before; all share a tick's state only after this.

@@ -14,9 +14,9 @@ from ftcc.airside.scheme import Flight
 from ftcc.airside.spec import Neighbour
 from ftcc.link.gate import Gate, Go, Limit, Pace, Release, Stop
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint
+from ftcc.link.messages import StateMessage
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
-from ftcc.link.wire import STATE
 from tests.pymavlink_wire import read_command, read_target, state_messages
 from tests.swarm import GRAPH, LEADERS, autopilot, timing
 
@@ -26,7 +26,7 @@ FLIGHT = Flight(GRAPH, 0.01, 0.05, 0.05, 2.0, False)
 
 def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarray:
     """State messages of an aircraft that does not exist."""
-    values = dict.fromkeys(STATE, 0.0)
+    values = dict.fromkeys(StateMessage._fields, 0.0)
     values |= {"q1": np.cos(theta / 2), "q3": np.sin(theta / 2), "pitchspeed": q, "z": -z}
     values |= {"vx": V * np.cos(gamma), "vz": -V * np.sin(gamma)}
     return np.array(list(values.values())).astype(np.float32).astype(np.float64)

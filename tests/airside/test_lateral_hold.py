@@ -10,11 +10,11 @@ import pytest
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import LARGEST_BANK, hold_course
 from ftcc.airside.model import Model
+from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State
 from ftcc.sim.sensors import encode_state
-from ftcc.sim.spec import build
 from ftcc.sim.trim import trim
 from tests.swarm import AIRFRAME, vehicle
 
@@ -32,7 +32,7 @@ def flown(V: float, seconds: float, course: float = 0.0, **start: float) -> np.n
     state = State(0.0, 0.0, 1000.0, V, 0.0, 0.0, 0.0, level.alpha, 0.0, 0.0, 0.0, 0.0)._replace(**start)
     limits = ((-TRAVEL, TRAVEL), (-0.8, 0.8), (-TRAVEL, TRAVEL), (0.0, 120.0))
     command = (0.0, level.elevator, 0.0, level.thrust)
-    fleet = build([vehicle(plant="attitude", initial=state, lag=(20.0,) * 4, limits=limits, command=command)])
+    fleet = build_fleet([vehicle(plant="attitude", initial=state, lag=(20.0,) * 4, limits=limits, command=command)])
     cycle = cycle_of("attitude")
     true, message, own = np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(Own._fields))
     next_command = np.array(command)

@@ -52,7 +52,7 @@ def _flyer(mission: Mission) -> Any:
     """A compiled function that flies some ticks and adds the time of each stage to its last argument."""
     vehicle, pilot = vehicle_flight(mission.plant), autopilot_flight(mission.scheme.name)
     force, send_state, record, fly_on, listen = (
-        vehicle.bring_into_force, vehicle.tell, vehicle.record, vehicle.fly_on, vehicle.listen,
+        vehicle.bring_into_force, vehicle.transmit, vehicle.record, vehicle.fly_on, vehicle.listen,
     )  # fmt: skip
     measure = cycle_of(mission.plant).sense
     hear_states, sense, hear, refer, control, actuate, tell, report = (
@@ -79,8 +79,8 @@ def _flyer(mission: Mission) -> Any:
                         force(vehicles, timing, i)
                     elif stage == 2:
                         state, controls = vehicles.states[i], vehicles.controls[i]
-                        true, seen = vehicles.true[i], vehicles.seen
-                        measure(vehicles.fleet, i, tick, now_us, timing.seed, true, seen, state, controls)
+                        true, measured = vehicles.true[i], vehicles.measured
+                        measure(vehicles.fleet, i, tick, now_us, timing.seed, true, measured, state, controls)
                     elif stage == 3:
                         send_state(vehicles, timing, i)
                     elif stage == 4:

@@ -36,7 +36,7 @@ def test_everybody_but_the_link_counts_from_the_origin() -> None:
     mission = resolve(load("containment", settings=["home.datum=1000.0"]))
     loop = loop_of("containment", "longitudinal")
     world = loop.new_world(mission.vehicles, mission.autopilots, mission.timing, 40)
-    loop.cycle.sense(world.fleet, 0, 0, 0, 1, world.true[0], world.seen, world.state, world.controls)
+    loop.cycle.sense(world.fleet, 0, 0, 0, 1, world.true[0], world.measured, world.state, world.controls)
     altitude = mission.vehicles[0].initial[2]
     assert world.state[9] == np.float32(-(altitude - 1000.0))
     tick_of("containment").sense(world.autopilots, 0, world.state, world.controls, 0)

@@ -50,6 +50,18 @@ def test_a_result_is_kept_bit_for_bit_for_its_arguments():
     assert asked.times == 2
 
 
+def test_an_edit_of_its_own_file_makes_a_result_anew(tmp_path):
+    """Also of a file that is not among the sources which name the folder."""
+    file = tmp_path / "of_a_test.py"
+    source = "from ftcc.link.cache import kept\n@kept\ndef answer(x):\n    return x + 1\n"
+    for text, expected in ((source, 2), (source.replace("+ 1", "+ 2"), 3), (source, 2)):
+        file.write_text(text)
+        module: dict[str, object] = {}
+        exec(compile(text, str(file), "exec"), module)
+        assert module["answer"](1) == expected
+    assert len(list(tmp_path.rglob("*.json"))) == 2
+
+
 def test_what_raises_is_asked_again():
     def refuse():
         raise ValueError("no")

@@ -55,8 +55,6 @@ class Package:
         self.cache = folder / "cache"
         for name in ("link", "sim", "airside"):
             shutil.copytree(PACKAGES / name, self.root / name, ignore=shutil.ignore_patterns("__pycache__"))
-        (self.root / "groundside").mkdir()
-        (self.root / "groundside" / "flight_loop.py").write_text('"""None."""\n')
         (self.root / "airside" / "caller.py").write_text(
             "from ftcc.airside.elements.neighbours import extrapolated\n"
             "from ftcc.link.compiled import compiled\n"

@@ -23,7 +23,7 @@ def temporary(tmp_path, monkeypatch):
         monkeypatch.setenv(name, "")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(folders, "_told", set())
+    monkeypatch.setattr(folders, "_warned", set())
     warnings.simplefilter("error")
     return tmp_path
 

@@ -11,12 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST
+from ftcc.sim.actuation import Autothrottle
 from ftcc.sim.airframe import attitude_rates, longitudinal_rates, scaled
-from ftcc.sim.plant import LOST, TRUTH, Autothrottle, Fault, Guards
+from ftcc.sim.build import build_fleet
+from ftcc.sim.faults import Fault
+from ftcc.sim.plant import LOST, TRUTH, Guards
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State, initial
 from ftcc.sim.sensors import encode_state
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 from tests.swarm import AIRFRAME, TRIM, vehicle
 
 advance, truth, actuate = (getattr(cycle_of("attitude"), name) for name in ("advance", "truth", "actuate"))
@@ -150,9 +153,9 @@ def test_in_the_plane_of_symmetry_it_is_the_longitudinal_model():
 def test_a_longitudinal_flight_is_the_same_on_both_models():
     """Ten seconds with lag, an elevator fault and a thrust step."""
     events = {"lag": (20.0,) * 4, "faults": (Fault(4.0, ELEVATOR, 0.8, 0.02, 0.0, 0.0),)}
-    six = build([aircraft(**events)])
+    six = build_fleet([aircraft(**events)])
     travel = ((0.0, 0.0), (-0.8, 0.8), (0.0, 0.0), (0.0, 120.0))
-    two = build([vehicle(initial=(30.0, 0.0, 1000.0, 0.0, ALPHA, 0.0), limits=travel, **events)])
+    two = build_fleet([vehicle(initial=(30.0, 0.0, 1000.0, 0.0, ALPHA, 0.0), limits=travel, **events)])
     for fleet in (six, two):
         fleet.command[0] = (0.0, -0.19, 0.0, 25.0)
     longitudinal = cycle_of("longitudinal")
@@ -169,7 +172,7 @@ def test_two_seconds_agree_with_an_adaptive_integrator():
     """All surfaces deflected, from a sideslipping, banked start."""
     start = State(0.0, 5.0, 1000.0, 28.0, 0.3, 0.05, 0.2, 0.06, 0.05, 0.1, -0.05, 0.02)
     command = (0.03, -0.22, -0.04, 40.0)
-    fleet = build([aircraft(initial=start)])
+    fleet = build_fleet([aircraft(initial=start)])
     fleet.command[0] = command
     assert flown(fleet, 2.0) == 0
     plain = getattr(attitude_rates, "py_func", attitude_rates)
@@ -186,7 +189,7 @@ def test_two_seconds_agree_with_an_adaptive_integrator():
 
 def test_a_flight_comes_back_from_its_messages():
     """Truth, encoded and decoded as an autopilot does, along a manoeuvre with everything in motion."""
-    fleet = build([aircraft(initial=LEVEL._replace(beta=0.1, mu=0.3))])
+    fleet = build_fleet([aircraft(initial=LEVEL._replace(beta=0.1, mu=0.3))])
     fleet.command[0] = (-0.1, -0.21, 0.05, 40.0)
     true, message, own = np.zeros(len(TRUTH)), np.zeros(13), np.zeros(len(Own._fields))
     for k in range(300):
@@ -201,7 +204,7 @@ def test_a_flight_comes_back_from_its_messages():
 
 
 def test_course_and_bank_are_told_within_half_a_turn():
-    fleet = build([aircraft(initial=LEVEL._replace(chi=3.5, mu=-7.0))])
+    fleet = build_fleet([aircraft(initial=LEVEL._replace(chi=3.5, mu=-7.0))])
     out = np.zeros(len(TRUTH))
     truth(fleet, 0, 0.0, out)
     assert out[TRUTH.index("chi")] == pytest.approx(3.5 - 2.0 * math.pi)
@@ -213,7 +216,7 @@ def test_course_and_bank_are_told_within_half_a_turn():
     [(AILERON, "p", -1), (ELEVATOR, "q", -1), (RUDDER, "r", -1), (THRUST, "V", 1)],
 )
 def test_a_positive_deflection_turns_about_its_own_axis_negatively(deflected, rate, sign):
-    fleet = build([aircraft()])
+    fleet = build_fleet([aircraft()])
     fleet.command[0, deflected] += 0.05
     assert flown(fleet, 0.05) == 0
     change = fleet.state[0] - np.array(LEVEL)
@@ -223,7 +226,7 @@ def test_a_positive_deflection_turns_about_its_own_axis_negatively(deflected, ra
 def test_every_actuator_has_lag_limit_and_faults_of_its_own():
     lag = (20.0, 10.0, 5.0, 2.0)
     faults = tuple(Fault(0.0, n, 0.5, 0.01 * (n + 1), 0.0, 0.0) for n in range(4))
-    fleet = build([aircraft(lag=lag, faults=faults)])
+    fleet = build_fleet([aircraft(lag=lag, faults=faults)])
     command = np.array([0.05, -0.25, -0.05, 30.0])
     fleet.command[0] = command
     assert flown(fleet, 0.1) == 0
@@ -237,7 +240,7 @@ def test_every_actuator_has_lag_limit_and_faults_of_its_own():
 def test_a_rate_limit_bounds_the_motion_exactly(lag):
     """At the limit until lag (command - position) falls below it, then exponentially."""
     target = 0.5
-    fleet = build([aircraft(lag=(lag, 0.0, 0.0, 0.0), rate=(1.0, math.inf, math.inf, math.inf))])
+    fleet = build_fleet([aircraft(lag=(lag, 0.0, 0.0, 0.0), rate=(1.0, math.inf, math.inf, math.inf))])
     fleet.command[0, AILERON] = target
     near = 1.0 / lag if lag else 0.0
     for k in range(70):
@@ -250,7 +253,7 @@ def test_a_rate_limit_bounds_the_motion_exactly(lag):
 
 def test_the_autothrottle_holds_the_airspeed_instead_of_the_commanded_thrust():
     """thrust + gain (airspeed - V), within limits; elevator and thrust are those of the trim table."""
-    fleet = build([aircraft(lag=(0.0, 0.0, 0.0, 20.0), autothrottle=Autothrottle(10.0, 25.0, 18.904))])
+    fleet = build_fleet([aircraft(lag=(0.0, 0.0, 0.0, 20.0), autothrottle=Autothrottle(10.0, 25.0, 18.904))])
     fleet.command[0] = (0.0, -0.303011, 0.0, 111.0)
     actuate(fleet, 0, 0.0)
     assert fleet.acting[0, THRUST] == TRIM[THRUST], "of which the lag knows nothing yet"
@@ -277,7 +280,7 @@ def test_the_autothrottle_holds_the_airspeed_instead_of_the_commanded_thrust():
     ids=["stall", "climb", "tumble", "spin", "nan", "overflow"],
 )
 def test_an_aircraft_that_leaves_its_model_is_lost_with_the_reason(changes, command, reason):
-    fleet = build([aircraft(initial=LEVEL._replace(**changes), guards=Guards(10.0, 1.5, 1.5, 1.4))])
+    fleet = build_fleet([aircraft(initial=LEVEL._replace(**changes), guards=Guards(10.0, 1.5, 1.5, 1.4))])
     fleet.command[0] = command
     assert LOST[flown(fleet, 20.0)] == reason
 
@@ -287,7 +290,7 @@ def test_whatever_is_commanded_an_aircraft_that_is_not_lost_has_a_finite_state()
     ends = set()
     for _ in range(40):
         start, _ = drawn(random)
-        fleet = build([aircraft(initial=start, lag=(20.0,) * 4, rate=(4.0, 4.0, 4.0, math.inf))])
+        fleet = build_fleet([aircraft(initial=start, lag=(20.0,) * 4, rate=(4.0, 4.0, 4.0, math.inf))])
         for k in range(600):
             if k % 20 == 0:
                 fleet.command[0] = random.uniform(-1e3, 1e3, 4)
@@ -306,7 +309,7 @@ def test_a_start_says_its_attitude_by_pitch_or_by_angle_of_attack():
     for also in ({"mu": 0.5}, {"beta": 0.2}, {"mu": -0.4, "beta": 0.1, "gamma": 0.2}):
         banked = initial({"V": 30.0, "z": 1000.0, "theta": 0.1} | also, steady)
         out = np.zeros(len(TRUTH))
-        truth(build([aircraft(initial=banked)]), 0, 0.0, out)
+        truth(build_fleet([aircraft(initial=banked)]), 0, 0.0, out)
         assert out[TRUTH.index("theta")] == pytest.approx(0.1, abs=1e-12)
         assert abs(banked.alpha) < 0.3
     with pytest.raises(ValueError, match="both given"):

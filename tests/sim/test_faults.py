@@ -11,11 +11,13 @@ from ftcc.airside.flight_path import Own, decode_state
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.link.failures import AIRFRAME_SIZES, KINDS, UNITS, Failure, meaning_of
 from ftcc.sim import navigation
-from ftcc.sim.faults import SPARE, faults_of, inject
+from ftcc.sim.build import build_fleet
+from ftcc.sim.faults import INTERMITTENT, STUCK, Fault
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.injection import SPARE, faults_of, inject
 from ftcc.sim.navigation import ATTITUDE, POSITION, NavigationFault
-from ftcc.sim.plant import INTERMITTENT, STUCK, Fault, Fleet
 from ftcc.sim.plants import cycle_of
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 from tests.swarm import LEADER, TRIM, vehicle
 
 cycle = cycle_of("longitudinal")
@@ -28,7 +30,7 @@ class Flight:
     """One vehicle, flown in periods of 10 ms; what acts on its elevator at every tick."""
 
     def __init__(self, spec: VehicleSpec) -> None:
-        self.fleet = build([spec])
+        self.fleet = build_fleet([spec])
         self.acting: list[float] = []
         self.messages: list[np.ndarray] = []
 
@@ -178,7 +180,7 @@ def active(fleet: Fleet) -> list[Fault]:
 
 def test_what_is_injected_is_what_is_planned():
     fault = Fault(4.0, ELEVATOR, 0.7, 0.35, 2.0, 2.0)
-    planned, injected = build([vehicle(faults=(fault,))]), build([vehicle()])
+    planned, injected = build_fleet([vehicle(faults=(fault,))]), build_fleet([vehicle()])
     asked = failure("servo", "wrong", 2, FAIL_EFF=0.7, FAIL_BIAS=0.35, FAIL_EFF_RATE=2.0, FAIL_BIAS_RATE=2.0)
     for one in faults_of(injected, 0, asked, 4.0):
         assert inject(injected, 0, one, 1.0)
@@ -186,31 +188,31 @@ def test_what_is_injected_is_what_is_planned():
 
 
 def test_the_same_asked_for_twice_is_one_and_another_of_that_time_replaces_it():
-    fleet = build([vehicle()])
+    fleet = build_fleet([vehicle()])
     for effectiveness in (0.6, 0.6, 0.8):
         assert inject(fleet, 0, Fault(4.0, ELEVATOR, effectiveness, 0.0, 0.0, 0.0), 1.0)
     assert [fault.effectiveness for fault in active(fleet)] == [0.8]
 
 
 def test_a_long_session_of_faults_and_repairs_does_not_fill_the_table():
-    fleet = build([vehicle()])
+    fleet = build_fleet([vehicle()])
     for second in range(10 * SPARE):
         assert inject(fleet, 0, HEALTHY._replace(time=float(second), effectiveness=0.5), float(second))
         assert inject(fleet, 0, HEALTHY._replace(time=float(second), actuator=float(THRUST)), float(second))
 
 
 def test_more_than_there_is_room_for_is_refused_and_changes_nothing():
-    fleet = build([vehicle()])
+    fleet = build_fleet([vehicle()])
     answers = [inject(fleet, 0, HEALTHY._replace(time=100.0 + n), 1.0) for n in range(SPARE + 1)]
     assert answers == [True] * SPARE + [False]
     assert [fault.time for fault in active(fleet)] == [100.0 + n for n in range(SPARE)]
 
 
 def test_a_part_that_the_aircraft_has_not_cannot_fail():
-    fleet = build([vehicle()])
+    fleet = build_fleet([vehicle()])
     assert faults_of(fleet, 0, failure("servo", "off", 1), 1.0) == []
     assert [fault[1] for fault in faults_of(fleet, 0, failure("servo", "off", 0), 1.0)] == [ELEVATOR]
 
 
 def test_a_reference_point_has_room_but_no_faults():
-    assert build([vehicle(kind="reference_point", target=LEADER)]).fault_count.tolist() == [0]
+    assert build_fleet([vehicle(kind="reference_point", target=LEADER)]).fault_count.tolist() == [0]

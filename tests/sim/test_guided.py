@@ -10,11 +10,13 @@ import pytest
 
 from ftcc.groundside.scenario.loading import load_airframe, shipped
 from ftcc.link.actuators import SLOT
+from ftcc.sim.build import build_fleet
+from ftcc.sim.disturbances import Disturbance
+from ftcc.sim.fleet import Fleet
 from ftcc.sim.inner_loop import load_factor
-from ftcc.sim.plant import TRUTH, Disturbance, Fleet
+from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.guided import Parameters, State, initial, level
-from ftcc.sim.spec import build
 from tests.swarm import vehicle
 
 cycle = cycle_of("guided")
@@ -35,7 +37,7 @@ def aircraft(V: float, **changes: object) -> Fleet:
         "command": (0.0, 1.0, 0.0, steady.thrust),
         "limits": LIMITS,
     }
-    return build([vehicle(**standard | changes)])
+    return build_fleet([vehicle(**standard | changes)])
 
 
 def state(fleet: Fleet) -> State:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ftcc.link.events import drain_events, new_events, note
+from ftcc.sim.build import build_fleet
 from ftcc.sim.obstacles import ENTERED, Obstacle, clearance, watch, zones_of
 from ftcc.sim.plants import cycle_of
-from ftcc.sim.spec import build
 from tests.swarm import vehicle
 
 HILLS = (Obstacle(2500.0, 4500.0, 430.0), Obstacle(4000.0, 6000.0, 450.0))
@@ -52,7 +52,7 @@ def test_a_list_that_nobody_empties_keeps_what_came_first() -> None:
 
 def test_a_vehicle_in_a_zone_is_noted_in_its_tick() -> None:
     low = (30.0, 3000.0, 400.0, 0.0, 0.0322, 0.0)
-    fleet = build([vehicle(1, obstacles=HILLS), vehicle(2, obstacles=HILLS, initial=low)])
+    fleet = build_fleet([vehicle(1, obstacles=HILLS), vehicle(2, obstacles=HILLS, initial=low)])
     for i in range(2):
         cycle_of("longitudinal").sense(fleet, i, 7, 70_000, 1, np.zeros(13), np.zeros(13), np.zeros(13), np.zeros(4))
     assert drain_events(fleet.events) == [(70_000, 1, ENTERED, 1)]

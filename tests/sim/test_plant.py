@@ -11,10 +11,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ftcc.link.actuators import ELEVATOR, THRUST
+from ftcc.sim.actuation import actuate
 from ftcc.sim.airframe import longitudinal_rates
-from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, Guards, actuate
+from ftcc.sim.build import build_fleet
+from ftcc.sim.disturbances import Disturbance
+from ftcc.sim.faults import Fault
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.plant import LOST, TRUTH, Guards
 from ftcc.sim.plants import conditions_of, cycle_of
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 from tests.swarm import AIRFRAME, LEADER, TRIM, vehicle
 
 cycle = cycle_of("longitudinal")
@@ -113,7 +118,7 @@ SWINGS = {
 def test_two_seconds_agree_with_an_adaptive_integrator(events, before, lag):
     """Fault, disturbance and lag included; exponential onsets are held over each step of 1 ms at their middle value."""
     spec = vehicle(lag=lag, fault_before_lag=before, **events)
-    fleet = build([spec])
+    fleet = build_fleet([spec])
     fleet.command[0] = COMMAND
     assert flown(fleet, 2000) == 0
     tolerance = 2e-9 if events in ({}, STEPS) else 2e-6
@@ -126,7 +131,7 @@ def test_integration_is_of_fourth_order():
     exact = reference(spec, TRIM, 2.0)
 
     def error(step_us: int) -> float:
-        fleet = build([spec])
+        fleet = build_fleet([spec])
         flown(fleet, 2000, step_us, 40_000)
         return float(np.abs(fleet.state[0] - exact[:6]).max())
 
@@ -135,7 +140,7 @@ def test_integration_is_of_fourth_order():
 
 def test_without_air_the_aircraft_falls_on_a_parabola():
     thrown = (20.0, 0.0, 500.0, 0.4, 0.4, 0.1)
-    fleet = build([vehicle(airframe=AIRFRAME._replace(rho=0.0), command=(0.0,) * 4, initial=thrown)])
+    fleet = build_fleet([vehicle(airframe=AIRFRAME._replace(rho=0.0), command=(0.0,) * 4, initial=thrown)])
     assert flown(fleet, 1500) == 0
     V, x, z, gamma, theta, q = fleet.state[0]
     vx, vz, t, g = 20.0 * math.cos(0.4), 20.0 * math.sin(0.4), 1.5, AIRFRAME.g
@@ -147,7 +152,7 @@ def test_without_air_the_aircraft_falls_on_a_parabola():
 
 
 def test_trimmed_aircraft_stays_where_it_is():
-    fleet = build([vehicle(lag=LAG)])
+    fleet = build_fleet([vehicle(lag=LAG)])
     assert flown(fleet, 2000) == 0
     assert fleet.state[0, 0] == pytest.approx(30.0, abs=1e-3)
     assert fleet.state[0, 1] == pytest.approx(60.0, abs=1e-3)
@@ -161,7 +166,7 @@ def test_trimmed_aircraft_stays_where_it_is():
 def test_lag_follows_its_exact_solution(actuator, bandwidth):
     """pos' = lag (command - pos), from the trim on."""
     lag = tuple(bandwidth if n == actuator else 0.0 for n in range(4))
-    fleet = build([vehicle(lag=lag)])
+    fleet = build_fleet([vehicle(lag=lag)])
     fleet.command[0] = COMMAND
     for k in range(20):
         t = (k + 1) * 0.01
@@ -171,8 +176,8 @@ def test_lag_follows_its_exact_solution(actuator, bandwidth):
 
 
 def test_positions_start_at_the_initial_command_within_its_limits():
-    assert build([vehicle()]).position[0].tolist() == list(TRIM)
-    assert build([vehicle(command=(0.3, 0.9, 0.0, 55.0))]).position[0].tolist() == [0.0, 0.7, 0.0, 40.0]
+    assert build_fleet([vehicle()]).position[0].tolist() == list(TRIM)
+    assert build_fleet([vehicle(command=(0.3, 0.9, 0.0, 55.0))]).position[0].tolist() == [0.0, 0.7, 0.0, 40.0]
 
 
 @pytest.mark.parametrize("lag", [(0.0,) * 4, LAG], ids=["no lag", "lag"])
@@ -182,7 +187,7 @@ def test_positions_start_at_the_initial_command_within_its_limits():
 )
 def test_commands_saturate_at_the_limits(lag, command, limited):
     """Table 5.1: T in [0, 40] N, elevator in [-0.7, 0.7] rad."""
-    fleet = build([vehicle(lag=lag)])
+    fleet = build_fleet([vehicle(lag=lag)])
     fleet.command[0] = command
     for k in range(50):
         advance(fleet, 0, k * 10_000, 10_000, STEP)
@@ -192,7 +197,7 @@ def test_commands_saturate_at_the_limits(lag, command, limited):
 
 def acting_over_time(spec: VehicleSpec, seconds: float = 1.0) -> Callable[[float], float]:
     """The elevator that acts at each tick of 10 ms under `COMMAND`."""
-    fleet = build([spec])
+    fleet = build_fleet([spec])
     fleet.command[0] = COMMAND
     rows = {}
     for k in range(round(seconds * 100) + 1):
@@ -247,7 +252,7 @@ def test_the_latest_fault_of_an_actuator_counts_and_a_repair_is_one():
 
 def test_the_conditions_of_a_vehicle_are_its_faults_and_disturbances():
     faults = (Fault(0.2, ELEVATOR, 0.5, 0.1, 0.0, 0.0), Fault(0.4, THRUST, 0.9, 0.0, 0.0, 0.0))
-    fleet = build([vehicle(faults=faults, disturbances=(Disturbance(0.6, 1.0, 0.3, 0.0),))])
+    fleet = build_fleet([vehicle(faults=faults, disturbances=(Disturbance(0.6, 1.0, 0.3, 0.0),))])
     names = [name for name, _ in conditions_of("longitudinal")]
 
     def at(time):
@@ -263,7 +268,7 @@ def test_the_conditions_of_a_vehicle_are_its_faults_and_disturbances():
 
 def test_only_the_faulty_aircraft_feels_its_fault():
     healthy, faulty = vehicle(1), vehicle(2, faults=(Fault(0.0, ELEVATOR, 0.7, 0.35, 0.0, 0.0),))
-    together, alone = build([healthy, faulty]), build([healthy])
+    together, alone = build_fleet([healthy, faulty]), build_fleet([healthy])
     for start in range(0, 500_000, 10_000):
         for i in (0, 1):
             advance(together, i, start, 10_000, STEP)
@@ -275,7 +280,10 @@ def test_only_the_faulty_aircraft_feels_its_fault():
 @pytest.mark.parametrize(("channel", "state"), [(0, 0), (1, 3), (2, 5)])
 def test_a_disturbance_acts_on_its_own_equation_from_its_time_on(channel, state):
     """(5.1)-(5.5): d1 on the airspeed, d2 on the flight-path angle, d3 on the pitch rate."""
-    calm, disturbed = build([vehicle()]), build([vehicle(disturbances=(Disturbance(0.1, channel, 0.2, 0.0),))])
+    calm, disturbed = (
+        build_fleet([vehicle()]),
+        build_fleet([vehicle(disturbances=(Disturbance(0.1, channel, 0.2, 0.0),))]),
+    )
     flown(calm, 100)
     flown(disturbed, 100)
     assert np.array_equal(calm.state, disturbed.state)
@@ -288,8 +296,8 @@ def test_a_disturbance_acts_on_its_own_equation_from_its_time_on(channel, state)
 
 
 def test_disturbances_add_up():
-    one = build([vehicle(disturbances=(Disturbance(0.0, 0, 0.3, 0.0),))])
-    two = build([vehicle(disturbances=(Disturbance(0.0, 0, 0.1, 0.0), Disturbance(0.0, 0, 0.2, 0.0)))])
+    one = build_fleet([vehicle(disturbances=(Disturbance(0.0, 0, 0.3, 0.0),))])
+    two = build_fleet([vehicle(disturbances=(Disturbance(0.0, 0, 0.1, 0.0), Disturbance(0.0, 0, 0.2, 0.0)))])
     flown(one, 500)
     flown(two, 500)
     assert two.state == pytest.approx(one.state, rel=1e-12)
@@ -310,7 +318,7 @@ def test_disturbances_add_up():
     ids=["stall", "dive or climb", "tumble", "nan", "overflow"],
 )
 def test_an_aircraft_that_leaves_its_model_is_lost_with_the_reason(changes, command, reason):
-    fleet = build([vehicle(**{"guards": Guards(10.0, 1.5, 1.5, 1.4)} | changes)])
+    fleet = build_fleet([vehicle(**{"guards": Guards(10.0, 1.5, 1.5, 1.4)} | changes)])
     fleet.command[0] = command
     assert LOST[flown(fleet, 20_000)] == reason
 
@@ -320,7 +328,9 @@ def test_whatever_is_commanded_an_aircraft_that_is_not_lost_has_a_finite_state()
     ends = set()
     for _ in range(40):
         start = random.uniform([4.0, 0.0, 0.0, -1.2, -1.2, -3.0], [60.0, 0.0, 0.0, 1.2, 1.2, 3.0])
-        fleet = build([vehicle(initial=tuple(start), lag=LAG, faults=(Fault(0.5, ELEVATOR, 0.2, 0.5, 0.0, 0.0),))])
+        fleet = build_fleet(
+            [vehicle(initial=tuple(start), lag=LAG, faults=(Fault(0.5, ELEVATOR, 0.2, 0.5, 0.0, 0.0),))]
+        )
         for k in range(600):
             if k % 20 == 0:
                 fleet.command[0] = random.uniform(-1e3, 1e3, 4)
@@ -336,7 +346,7 @@ def test_whatever_is_commanded_an_aircraft_that_is_not_lost_has_a_finite_state()
 
 
 def test_truth_is_the_state_in_the_order_of_its_names():
-    fleet = build([vehicle(initial=(31.0, 5.0, 990.0, 0.1, 0.15, 0.02), offset=-20.0)])
+    fleet = build_fleet([vehicle(initial=(31.0, 5.0, 990.0, 0.1, 0.15, 0.02), offset=-20.0)])
     out = np.full(len(TRUTH), math.nan)
     truth(fleet, 0, 3.0, out)
     expected = dict.fromkeys(TRUTH, 0.0) | {
@@ -346,7 +356,7 @@ def test_truth_is_the_state_in_the_order_of_its_names():
 
 
 def test_a_reference_point_moves_at_the_velocity_of_its_target_from_its_stamp_on():
-    fleet = build([vehicle(7, kind="reference_point", target=LEADER)])
+    fleet = build_fleet([vehicle(7, kind="reference_point", target=LEADER)])
     out = np.zeros(len(TRUTH))
     truth(fleet, 0, 2.0, out)
     assert (out[0], out[2], out[3]) == (60.0, 1000.0, 30.0)

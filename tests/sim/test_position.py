@@ -9,10 +9,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ftcc.link.actuators import SLOT, THRUST
-from ftcc.sim.plant import LOST, TRUTH, Disturbance, Fault, Fleet, Gust, gust, latch, stroke
+from ftcc.sim.actuation import latch, stroke
+from ftcc.sim.build import build_fleet
+from ftcc.sim.disturbances import Disturbance, Gust, gust
+from ftcc.sim.faults import Fault
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.position import Disturbances, Inputs, Parameters, State, drag, initial, rates, wind_speed
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 from tests.swarm import vehicle
 
 cycle = cycle_of("position")
@@ -74,7 +79,7 @@ def test_thrust_cannot_brake():
 
 
 def test_a_turn_agrees_with_an_adaptive_integrator():
-    fleet = build([point(disturbances=(Disturbance(0.0, 0, -2.0, 0.0), Disturbance(0.0, 3, 10.0, 0.0)))])
+    fleet = build_fleet([point(disturbances=(Disturbance(0.0, 0, -2.0, 0.0), Disturbance(0.0, 3, 10.0, 0.0)))])
     fleet.command[0] = (0.6, 1.3, 0.0, 90.0)
     assert flown(fleet, 5.0) == 0
     d = CALM._replace(b_x=-2.0, wind=10.0)
@@ -87,7 +92,7 @@ def test_a_turn_agrees_with_an_adaptive_integrator():
 
 
 def test_truth_shows_path_and_bank():
-    fleet = build([point()])
+    fleet = build_fleet([point()])
     fleet.command[0, BANK] = 0.4
     cycle.actuate(fleet, 0, 0.0)
     true = np.zeros(len(TRUTH))
@@ -97,7 +102,7 @@ def test_truth_shows_path_and_bank():
 
 
 def test_a_point_that_stops_is_lost():
-    fleet = build([point(initial=initial({"V": 3.2, "z": 100.0}, {}))])
+    fleet = build_fleet([point(initial=initial({"V": 3.2, "z": 100.0}, {}))])
     fleet.command[0] = (0.0, 1.0, 0.0, 0.0)
     fleet.airframe[0, Parameters._fields.index("CD0")] = 50.0
     assert LOST[flown(fleet, 5.0)] == "airspeed left the model"
@@ -105,7 +110,7 @@ def test_a_point_that_stops_is_lost():
 
 def test_a_second_order_actuator_follows_its_transfer_function():
     """n'' = 64 (n_c - n) - 11.2 n', whatever the steps, the fault behind it."""
-    fleet = build([point(**PLANT_B, faults=(Fault(0.0, LOAD, 0.5, 0.1, 0.0, 0.0),))])
+    fleet = build_fleet([point(**PLANT_B, faults=(Fault(0.0, LOAD, 0.5, 0.1, 0.0, 0.0),))])
     fleet.command[0, LOAD] = 1.5
     exact = solve_ivp(
         lambda t, x: [x[1], 64.0 * (1.5 - x[0]) - 11.2 * x[1]], (0.0, 0.4), [1.0, 0.0], rtol=1e-11, atol=1e-12
@@ -118,25 +123,25 @@ def test_a_second_order_actuator_follows_its_transfer_function():
 
 
 def test_bank_rolls_at_its_rate_limit():
-    fleet = build([point(**PLANT_B)])
+    fleet = build_fleet([point(**PLANT_B)])
     fleet.command[0, BANK] = 1.2
     assert flown(fleet, 0.2) == 0
     assert fleet.position[0, BANK] == pytest.approx(0.4)
 
 
 def test_gusts_are_normal_held_for_their_period_and_each_uavs_own():
-    first, second = (build([point(uav=uav, gust=Gust(0.9, 100_000, 5))]) for uav in (1, 2))
+    first, second = (build_fleet([point(uav=uav, gust=Gust(0.9, 100_000, 5))]) for uav in (1, 2))
     draws = np.array([gust(first, 0, 0.1 * n + 0.05) for n in range(2000)])
     assert [gust(first, 0, t) for t in (0.2001, 0.25, 0.2999)] == [draws[2]] * 3
     assert abs(draws.mean()) < 4.0 * 0.9 / math.sqrt(2000)
     assert draws.std() == pytest.approx(0.9, rel=4.0 / math.sqrt(4000))
     others = np.array([gust(second, 0, 0.1 * n + 0.05) for n in range(2000)])
     assert abs(np.corrcoef(draws, others)[0, 1]) < 4.0 / math.sqrt(2000)
-    assert gust(build([point()]), 0, 0.05) == 0.0
+    assert gust(build_fleet([point()]), 0, 0.05) == 0.0
 
 
 def test_a_delayed_command_acts_that_many_samples_later_and_the_first_one_at_once():
-    fleet = build([point(delay=2)])
+    fleet = build_fleet([point(delay=2)])
     acted = []
     for thrust in (10.0, 20.0, 30.0, 40.0, 50.0):
         latch(fleet, 0, np.array([0.0, 1.0, 0.0, thrust]))
@@ -145,7 +150,7 @@ def test_a_delayed_command_acts_that_many_samples_later_and_the_first_one_at_onc
 
 
 def test_a_command_given_for_the_start_stays_in_force_for_the_delay():
-    fleet = build([point(delay=2, holds_first=True, command=(0.0, 0.0, 0.0, 5.0))])
+    fleet = build_fleet([point(delay=2, holds_first=True, command=(0.0, 0.0, 0.0, 5.0))])
     acted = []
     for thrust in (10.0, 20.0, 30.0):
         latch(fleet, 0, np.array([0.0, 1.0, 0.0, thrust]))

@@ -9,11 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ftcc.airside.flight_path import Own, decode_state
-from ftcc.link.wire import STATE
+from ftcc.link.messages import StateMessage
+from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.sensors import encode_state
-from ftcc.sim.spec import build
 from tests.swarm import noise, vehicle
 
 LOWEST = {
@@ -30,7 +30,7 @@ FLOAT32 = 2.0**-23
 
 
 def encoded(measured: np.ndarray) -> np.ndarray:
-    message = np.zeros(len(STATE))
+    message = np.zeros(len(StateMessage._fields))
     encode_state(measured, message)
     return message
 
@@ -97,8 +97,8 @@ def test_altitude_is_up_in_laws_and_down_in_messages():
     state = np.zeros(len(TRUTH))
     state[TRUTH.index("z")], state[TRUTH.index("V")], state[TRUTH.index("gamma")] = 1000.0, 30.0, 0.1
     message = encoded(state)
-    assert message[STATE.index("z")] == -1000.0
-    assert message[STATE.index("vz")] == pytest.approx(-30.0 * math.sin(0.1))
+    assert message[StateMessage._fields.index("z")] == -1000.0
+    assert message[StateMessage._fields.index("vz")] == pytest.approx(-30.0 * math.sin(0.1))
 
 
 def test_stamp_and_command_in_force_are_handed_on():
@@ -112,7 +112,7 @@ def test_stamp_and_command_in_force_are_handed_on():
 
 def measured(deviations: tuple[float, ...], ticks: int, seed: int = 1, uav: int = 1) -> np.ndarray:
     """Measurements of a fixed truth, shape (ticks, 13)."""
-    fleet = build([vehicle(uav, noise=deviations)])
+    fleet = build_fleet([vehicle(uav, noise=deviations)])
     true = np.array([100.0, -5.0, 1000.0, 30.0, 0.02, 0.1, 0.05, 0.03, 0.0, 0.05, 0.01, 0.02, 0.03])
     rows = np.zeros((ticks, len(TRUTH)))
     for tick in range(ticks):

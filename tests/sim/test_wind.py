@@ -11,10 +11,13 @@ import pytest
 from ftcc.groundside.scenario.wind import low_altitude
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import body_attitude
-from ftcc.sim.plant import TRUTH, Disturbance, Fleet
+from ftcc.sim.build import build_fleet
+from ftcc.sim.disturbances import Disturbance
+from ftcc.sim.fleet import Fleet
+from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import conditions_of, cycle_of, find
 from ftcc.sim.plants.position import drag
-from ftcc.sim.spec import VehicleSpec, build
+from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import AIR, DiscreteGust, Turbulence, against, blow, dryden, moving_air
 from tests.sim.test_position import UAV, point
 from tests.swarm import AIRFRAME, vehicle
@@ -50,7 +53,7 @@ def truth(plant: str, fleet: Fleet, i: int = 0) -> dict[str, float]:
 
 def flown(plant: str, seconds: float, **changes: Any) -> dict[str, float]:
     """The true states after ``seconds``."""
-    fleet = build([aircraft(plant, **changes)])
+    fleet = build_fleet([aircraft(plant, **changes)])
     assert cycle_of(plant).advance(fleet, 0, 0, round(seconds * 1e6), 1000) == 0
     return truth(plant, fleet)
 
@@ -66,7 +69,9 @@ def steady(plant: str, **channels: float) -> tuple[Disturbance, ...]:
 def test_a_gust_is_half_a_cosine_and_holds() -> None:
     """MIL-F-8785C, 3.7.1.3: V_m (1 - cos(pi x/d_m))/2 up to d_m, V_m beyond; whole ones fall as they rise."""
     held, whole = DiscreteGust(1.0, 2.0, 0.0, -3.0, 4.0), DiscreteGust(1.0, 2.0, 0.0, -3.0, 4.0, until=3.0)
-    fleet = build([aircraft("longitudinal", discrete_gusts=(held,)), aircraft("longitudinal", discrete_gusts=(whole,))])
+    fleet = build_fleet(
+        [aircraft("longitudinal", discrete_gusts=(held,)), aircraft("longitudinal", discrete_gusts=(whole,))]
+    )
     for time, share in ((0.99, 0.0), (1.5, 0.5 * (1.0 - math.sqrt(0.5))), (2.0, 0.5), (3.0, 1.0), (9.0, 1.0)):
         assert [moving_air(fleet, 0, n, time) for n in range(3)] == pytest.approx([0.0, -3.0 * share, 4.0 * share])
     for time, share in ((2.0, 0.5), (3.0, 1.0), (4.5, 0.5 * (1.0 - math.sqrt(0.5))), (5.0, 0.0), (9.0, 0.0)):
@@ -75,7 +80,7 @@ def test_a_gust_is_half_a_cosine_and_holds() -> None:
 
 def test_gusts_add_up() -> None:
     rows = (DiscreteGust(0.0, 1.0, 2.0, 0.0, 0.0), DiscreteGust(5.0, 1.0, -2.0, 0.0, 0.0))
-    fleet = build([aircraft("longitudinal", discrete_gusts=rows)])
+    fleet = build_fleet([aircraft("longitudinal", discrete_gusts=rows)])
     assert [moving_air(fleet, 0, 0, t) for t in (4.0, 5.5, 7.0)] == pytest.approx([2.0, 1.0, 0.0])
 
 
@@ -126,7 +131,7 @@ SHAKEN = Turbulence((1.5, 0.8, 0.6), (0.5, 1.0, 2.0), 100_000, seed=7)
 
 def blown(uavs: tuple[int, ...], steps: int, turbulence: Turbulence = SHAKEN) -> np.ndarray:
     """(steps, vehicles, 3) of the air's velocity."""
-    fleet = build([aircraft("longitudinal", uav=uav, turbulence=turbulence) for uav in uavs])
+    fleet = build_fleet([aircraft("longitudinal", uav=uav, turbulence=turbulence) for uav in uavs])
     out = np.zeros((steps, len(uavs), 3))
     _blown(fleet, 0, out)
     return out
@@ -204,7 +209,7 @@ def test_an_aircraft_rises_in_an_updraft(plant: str, least: float, most: float) 
 
 def test_an_updraft_tilts_the_lift_of_a_point_forward() -> None:
     """Its load factor is held, so it gains speed instead: by g w/V, less the drag that grows with it."""
-    calm, lifted = (build([point(discrete_gusts=gusts)]) for gusts in ((), UPDRAFT))
+    calm, lifted = (build_fleet([point(discrete_gusts=gusts)]) for gusts in ((), UPDRAFT))
     for fleet in (calm, lifted):
         assert cycle_of("position").advance(fleet, 0, 0, 5_000_000, 1000) == 0
     growth, final, h = 2.0 * drag(50.0, 1.0, UAV) / UAV.m / 50.0, 0.0, 0.001
@@ -224,7 +229,7 @@ def test_in_air_that_moves_as_a_whole_an_aircraft_flies_as_in_still_air(plant: s
     faster = faster._replace(vx=faster.vx + 6.0) if plant == "guided" else faster._replace(V=faster.V + 6.0)
     # Out of trim, so that something happens.
     command = (0.3, 1.1, 0.0, 40.0) if plant == "guided" else (0.02 * (plant == "attitude"), -0.18, 0.0, 30.0)
-    fleet = build([spec, aircraft(plant, initial=tuple(faster), disturbances=steady(plant, gust=6.0))])
+    fleet = build_fleet([spec, aircraft(plant, initial=tuple(faster), disturbances=steady(plant, gust=6.0))])
     for i in range(2):
         fleet.command[i] = command
         assert cycle_of(plant).advance(fleet, i, 0, 2_000_000, 1000) == 0
@@ -259,7 +264,7 @@ def test_angles_against_a_velocity_are_those_that_made_the_attitude() -> None:
 
 
 def test_what_blows_is_recorded() -> None:
-    fleet = build([aircraft("longitudinal", discrete_gusts=(DiscreteGust(0.0, 1.0, 0.5, 0.0, 2.0),))])
+    fleet = build_fleet([aircraft("longitudinal", discrete_gusts=(DiscreteGust(0.0, 1.0, 0.5, 0.0, 2.0),))])
     out = np.zeros(len(conditions_of("longitudinal")))
     cycle_of("longitudinal").conditions(fleet, 0, 3.0, out)
     assert conditions_of("longitudinal")[-3:] == tuple((name, "m/s") for name in AIR)

@@ -1,0 +1,143 @@
+"""Actuators: the command in force, its delay, limits, lag and rate limit, and what acts on the airframe."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ftcc.link.actuators import ACTUATORS, THRUST
+from ftcc.link.compiled import compiled, compiled_within, copy, fields
+from ftcc.sim.faults import fault_in_force
+
+__all__ = ["NO_AUTOTHROTTLE", "Autothrottle", "actuate", "has_autothrottle", "hold_speed", "latch", "stroke"]
+
+
+class Autothrottle(NamedTuple):
+    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V) within limits."""
+
+    gain: float
+    """N per m/s; 0 = none."""
+    airspeed: float
+    """m/s."""
+    thrust: float
+    """N."""
+
+
+NO_AUTOTHROTTLE = Autothrottle(0.0, 0.0, 0.0)
+
+_GAIN = Autothrottle._fields.index("gain")
+
+
+@compiled
+def latch(fleet, i, command):
+    """Bring ``command`` (4,) into force, or the one that came before it by the vehicle's delay.
+
+    The first one counts as all that came before it, unless the line holds commands from the start.
+    """
+    line = fleet.delayed[i]
+    last = line.shape[0] - 1
+    if last < 0:
+        copy(command, fleet.command[i])
+        return
+    if fleet.waiting[i] == 0:
+        for n in range(last + 1):
+            copy(command, line[n])
+        fleet.waiting[i] = 1
+    copy(line[0], fleet.command[i])
+    for n in range(last):
+        copy(line[n + 1], line[n])
+    copy(command, line[last])
+
+
+@compiled_within
+def has_autothrottle(fleet, i):
+    """Whether vehicle ``i`` holds its speed by itself."""
+    return fleet.autothrottle[i, _GAIN] > 0.0
+
+
+@compiled_within
+def _saturated(fleet, i, actuator):
+    wanted = fleet.command[i, actuator]
+    if actuator == THRUST and has_autothrottle(fleet, i):
+        wanted = fleet.speed_hold[i]
+    return min(max(wanted, fleet.limits[i, actuator, 0]), fleet.limits[i, actuator, 1])
+
+
+@compiled_within
+def hold_speed(fleet, i, airspeed):
+    """Set the thrust by which the autothrottle of vehicle ``i`` answers this airspeed (m/s)."""
+    hold = fields(Autothrottle, fleet.autothrottle[i])
+    fleet.speed_hold[i] = hold.thrust + hold.gain * (hold.airspeed - airspeed)
+
+
+@compiled_within
+def _immediate(fleet, i, actuator, rate):
+    return fleet.lag[i, actuator] == 0.0 and rate == math.inf
+
+
+@compiled
+def actuate(fleet, i, time):
+    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force."""
+    for actuator in range(len(ACTUATORS)):
+        effectiveness, bias, rate = fault_in_force(fleet, i, actuator, time)
+        if _immediate(fleet, i, actuator, rate):
+            fleet.position[i, actuator] = _saturated(fleet, i, actuator)
+        elif fleet.fault_before_lag[i] > 0.0:
+            effectiveness, bias = 1.0, 0.0
+        fleet.acting[i, actuator] = effectiveness * fleet.position[i, actuator] + bias
+        fleet.deflection[i, actuator] = fleet.acting[i, actuator]
+
+
+@compiled
+def _moved(before, target, lag, rate, since):
+    """Position ``since`` s after ``before`` on the way to ``target``: pos' = lag (target - pos), at most ``rate``."""
+    away = abs(target - before)
+    if lag * away <= rate and lag > 0.0:
+        return target + (before - target) * math.exp(-lag * since)
+    slowing = rate / lag if lag > 0.0 else 0.0
+    until = (away - slowing) / rate
+    direction = 1.0 if target > before else -1.0
+    if since < until:
+        return before + direction * rate * since
+    return target - direction * slowing * math.exp(-lag * (since - until))
+
+
+@compiled
+def _swung(before, speed, target, frequency, damping, since):
+    """Position and rate of a second-order actuator ``since`` s after ``before`` and ``speed``, exactly."""
+    decay, beat = damping * frequency, frequency * math.sqrt(1.0 - damping * damping)
+    offset = before - target
+    lead = (speed + decay * offset) / beat
+    shrunk, cosine, sine = math.exp(-decay * since), math.cos(beat * since), math.sin(beat * since)
+    swing = shrunk * (offset * cosine + lead * sine)
+    return target + swing, shrunk * beat * (lead * cosine - offset * sine) - decay * swing
+
+
+@compiled
+def stroke(fleet, i, actuator, time, step):
+    """Acting deflection at the beginning, middle and end of a ``step`` (s); lag and rate limit are integrated exactly.
+
+    A fault is taken at ``time`` (s), the middle of the step.
+    """
+    effectiveness, bias, rate = fault_in_force(fleet, i, actuator, time)
+    target = _saturated(fleet, i, actuator)
+    before = fleet.position[i, actuator]
+    if _immediate(fleet, i, actuator, rate):
+        fleet.position[i, actuator] = target
+        deflection = effectiveness * target + bias
+        fleet.deflection[i, actuator] = deflection
+        return deflection, deflection, deflection
+    if fleet.fault_before_lag[i] > 0.0:
+        target = effectiveness * target + bias
+        effectiveness, bias = 1.0, 0.0
+    lag = fleet.lag[i, actuator]
+    if fleet.damping[i, actuator] > 0.0 and rate >= fleet.rate[i, actuator]:
+        speed, damping = fleet.speed[i, actuator], fleet.damping[i, actuator]
+        middle, _ = _swung(before, speed, target, lag, damping, 0.5 * step)
+        after, fleet.speed[i, actuator] = _swung(before, speed, target, lag, damping, step)
+    else:
+        middle = _moved(before, target, lag, rate, 0.5 * step)
+        after = _moved(before, target, lag, rate, step)
+    fleet.position[i, actuator] = after
+    fleet.deflection[i, actuator] = effectiveness * after + bias
+    return effectiveness * before + bias, effectiveness * middle + bias, fleet.deflection[i, actuator]
