@@ -118,6 +118,89 @@ def test_what_is_forked_has_loaded_neither_mesh_nor_ground():
     assert finished.stdout.split() == []
 
 
+# Inside a wing.
+
+
+def inner_imports(wing: str) -> dict[str, set[str]]:
+    """The modules of a wing, each with those of its own wing that it imports at module level, also for types alone."""
+    modules = {
+        ".".join(("ftcc", *path.relative_to(REPOSITORY).with_suffix("").parts)).removesuffix(".__init__"): path
+        for path in sources(wing)
+    }
+    imported: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        names: set[str] = set()
+        pending: list[ast.stmt] = ast.parse(path.read_text(encoding="utf-8")).body
+        while pending:
+            statement = pending.pop()
+            if isinstance(statement, ast.If):
+                pending += statement.body + statement.orelse
+            elif isinstance(statement, ast.Import):
+                names |= {alias.name for alias in statement.names}
+            elif isinstance(statement, ast.ImportFrom) and statement.module is not None:
+                # `from package import name`: the module of that name, where there is one.
+                names |= {
+                    full if (full := f"{statement.module}.{alias.name}") in modules else statement.module
+                    for alias in statement.names
+                }
+        imported[module] = (names & modules.keys()) - {module}
+    return imported
+
+
+def circles(imported: dict[str, set[str]]) -> list[str]:
+    """Take away, again and again, modules that import none of the others, or that none imports: what is left."""
+    left = dict(imported)
+    while True:
+        used = set().union(*left.values())
+        ends = [module for module, names in left.items() if module not in used or not names & left.keys()]
+        if not ends:
+            return sorted(left)
+        for module in ends:
+            del left[module]
+
+
+@pytest.mark.parametrize("wing", ["link", "sim", "groundside"])
+def test_imports_inside_a_wing_form_no_circle(wing):
+    assert circles(inner_imports(wing)) == []
+
+
+def test_a_circle_is_found():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}) == ["b", "c"]
+
+
+COLUMNS = 3
+"""A literal subscript from here on is the number of a column, which has a name: up to 2 it may be a vector's axis."""
+
+
+def column_numbers(text: str) -> Iterator[tuple[int, int]]:
+    """Line and value of every literal subscript, or bound of a slice, that is a number of a column."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Subscript):
+            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            for part in parts:
+                bounds = [part.lower, part.upper] if isinstance(part, ast.Slice) else [part]
+                for bound in bounds:
+                    number = bound.operand if isinstance(bound, ast.UnaryOp) else bound
+                    if isinstance(number, ast.Constant) and type(number.value) is int and number.value >= COLUMNS:
+                        yield node.lineno, number.value
+
+
+@pytest.mark.parametrize("wing", ["link", "sim"])
+def test_columns_are_read_by_their_names(wing):
+    """By `fields`, or by constants made of ``_fields``: a field that moves must not make another number fly."""
+    found = [
+        f"{path}:{line} has the literal subscript {number}"
+        for path in sources(wing)
+        for line, number in column_numbers(path.read_text(encoding="utf-8"))
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_a_column_number_is_found():
+    text = "a[3] + b[i, 4] + c[2] + d[5:] + e[:-6] + f['7'] + g[i + 8]"
+    assert sorted(number for _, number in column_numbers(text)) == [3, 4, 5, 6]
+
+
 # Truth never reaches control.
 
 
