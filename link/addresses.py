@@ -1,4 +1,4 @@
-"""Addresses of others: read from text, resolved, and tried, before anything is started that would speak to them."""
+"""Addresses of ground stations: parsed, resolved and tried before a swarm starts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Address = tuple[str, int]
 
 
 class AddressError(ValueError):
-    """Nobody can be spoken to there; the text says why."""
+    """No datagram can be sent there; the text says why."""
 
 
 def family_of(host: str) -> socket.AddressFamily:
@@ -39,12 +39,12 @@ def _split(text: str) -> tuple[str, int]:
 
 
 def resolve(text: str) -> Address:
-    """The address that HOST:PORT or [IPv6]:PORT means, where a datagram can be sent to.
+    """Parse HOST:PORT or [IPv6]:PORT, and resolve it to an address to which a datagram can be sent.
 
     Raises
     ------
     AddressError
-        If it is no address, no such host is known, it stands for no single host, or there is no way to it.
+        If it is no address, the host is unknown, it stands for no single host, or there is no route to it.
     """
     host, port = _split(text)
     try:

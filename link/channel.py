@@ -1,9 +1,9 @@
-"""The emulated radio channel, and the inbox behind it: what a receiver hears of each neighbour, and when.
+"""The emulated radio channel, and the inbox behind it: which records a receiver gets of each in-neighbour, and when.
 
 All times are simulated, in whole microseconds. A record stamped t may be used from the first tick >= t + L + d on: L is
 the link latency of the scenario, d the channel's delay and jitter for that record. The newest stamp wins, an age is
 never negative. The functions are compiled and work on plain arrays, so that the autopilot process and the
-single-process simulation run the very same code.
+single-process simulation run the same code.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SLOTS = 32
 """Records that can be under way on one edge at a time."""
 
 _SENDERS = 65536
-"""More than there are ids of UAVs: sender and receiver make one number, the counter of the edge's random draws."""
+"""More than there are ids of UAVs: sender and receiver make one number, which keys the random draws of their edge."""
 
 
 class LinkReport(NamedTuple):
@@ -95,7 +95,7 @@ _SENDER, _RECEIVER, _BURST, _NEXT, _RECEIVED, _LOST, _WAITING = range(len(Edge._
 
 
 class Inbox(NamedTuple):
-    """What the k UAVs of a process receive: first axis the UAV, second its in-edges (n at most), m shared values."""
+    """What the k UAVs of a process receive: first axis the UAV, second its in-edges (at most n); m shared values."""
 
     degree: NDArray[np.int64]
     """(k,): number of in-edges of each UAV."""
@@ -152,7 +152,7 @@ def _take(inbox, i, edge, stamp, values):
 
 @compiled
 def _pass_records(state, channel, sequence, seed):
-    """Step an edge's burst chain up to record ``sequence``; that record's draws for loss and jitter, each in [0, 1)."""
+    """Step an edge's burst chain up to record ``sequence``; returns its draws for loss and jitter, each in (0, 1)."""
     u_loss, u_jitter = 1.0, 0.0
     if channel.burst_start > 0.0 or channel.loss > 0.0 or channel.jitter > 0.0:
         link = state[_SENDER] * _SENDERS + state[_RECEIVER]

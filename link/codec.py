@@ -27,7 +27,7 @@ _UNSIGNED = frozenset({dialect.MAVLINK_MSG_ID_HEARTBEAT})
 
 
 class _Parser(dialect.MAVLink):  # type: ignore[misc]
-    """The dialect's parser and packer, with signatures checked before anything is made of their time stamps."""
+    """The dialect's parser and packer; it checks a signature before it uses its time stamp."""
 
     def __init__(self, system: int, component: int, signing: Signing | None) -> None:
         super().__init__(None, srcSystem=system, srcComponent=component)
@@ -42,7 +42,7 @@ class _Parser(dialect.MAVLink):  # type: ignore[misc]
             self.signing.allow_unsigned_callback = lambda _, kind: kind in _UNSIGNED
 
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
-        """The dialect's own lets a forged time stamp shut a sender out: it keeps the stamp, then checks."""
+        """The dialect's own method stores the stamp before it checks it: a forged one would shut a sender out."""
         assert self.own_signing is not None
         block = msgbuf[-_SIGNATURE:]
         if not self.own_signing.genuine(msgbuf):
@@ -61,9 +61,9 @@ class Codec:
     system, component : int
         Ids with which messages are sent.
     signing : Signing, optional
-        With it messages are signed, and unsigned ones, but for HEARTBEAT, and repeated ones are dropped.
+        With it messages are signed; unsigned ones, except HEARTBEAT, and repeated ones are dropped.
     lenient : collection of str
-        Further messages that may bring what is not finite: their readers check what they use.
+        Further messages that may hold nan or inf: their readers check what they use.
     """
 
     def __init__(
@@ -132,12 +132,12 @@ class Codec:
             self._refusals.append(refusal)
 
     def take_refusals(self) -> list[Refusal]:
-        """What was dropped because of its signature since the last call; of very many the first ones."""
+        """Return the messages dropped because of their signature since the last call; of very many the first ones."""
         refusals, self._refusals = self._refusals, []
         return refusals
 
     def _forget(self) -> None:
-        """Reset the parser: after one forged header it would swallow the next good datagrams."""
+        """Reset the parser: after a forged header it would take the next good datagrams for its payload."""
         if self._mav.buf_len() > 0:
             self.bad_data += 1
         self._mav.buf = bytearray()
@@ -153,7 +153,7 @@ _sum_floats: dict[int, Callable[[Any], float]] = {}
 
 
 def _adder(message: Any) -> Callable[[Any], float]:
-    """A function that adds up all floats of such a message: the sum is finite only if every term is."""
+    """A function that sums all floats of such a message: the sum is finite only if every term is."""
     kinds = zip(message.fieldnames, message.fieldtypes, strict=True)
     names = [name for name, kind in kinds if kind in ("float", "double")]
     if message.get_type() in _MAY_HOLD_NAN:

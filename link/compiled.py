@@ -1,8 +1,8 @@
 """Compilation of laws, elements and plants, with a cache that notices every edit.
 
 numba's own cache looks only at the file of the calling function: a law would go on flying the old code of an edited
-element. Therefore the cache lies in the folder of `cache`, named by the hash of all sources that can be compiled
-together, and this module, which sets ``NUMBA_CACHE_DIR``, is the only one that imports numba.
+element. Therefore the cache lies in the folder of `cache`, which is named by the hash of all sources that can be
+compiled together. This module sets ``NUMBA_CACHE_DIR``, and is the only one that imports numba.
 """
 
 from __future__ import annotations
@@ -72,22 +72,22 @@ def compiled(function: F) -> F:
 def compiled_apart(function: F) -> F:
     """As `compiled`, for a large function that is called from large ones: it is not copied into each of them.
 
-    Every compiled function is optimized with all that it contains: without such borders, the whole flight of a process
-    would be optimized anew at each level of its functions.
+    numba optimizes a function with all that is inlined into it: without such borders it would optimize the whole flight
+    of a process again at each level of its functions.
     """
     return _compiled(function, forceinline=False)
 
 
 def compiled_within(function: F) -> F:
-    """As `compiled`, for a step of one long function: it becomes part of its caller before that is compiled.
+    """As `compiled`, for a step of one long function: it is inlined into its caller before that is compiled.
 
-    So it may take arguments of very many arrays, which cost seconds at each border between compiled functions.
+    So it may take tuples of very many arrays, which cost seconds at each call between compiled functions.
     """
     return _compiled(function, inline="always")
 
 
 def compiled_to_wait(function: F) -> F:
-    """As `compiled`, for a function that waits for sockets: other threads of Python run meanwhile."""
+    """As `compiled`, for a function that waits for sockets: it releases the GIL."""
     return _compiled(function, nogil=True)
 
 
@@ -106,16 +106,16 @@ def _compiled(function: F, **options: Any) -> F:
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     """Compiled code of one function on disk, to which several processes may add at a time.
 
-    numba's own way reads the index, picks the next free file and writes both, with nobody kept out meanwhile: of two
-    processes that compile one function for different types, one may leave an index that names the other's code. Such
-    code is called with arguments that it was not made for, and may do anything: crash, or never return.
+    numba itself reads the index, picks the next free file and writes both, without a lock: of two processes that
+    compile one function for different types, one may leave an index that names the other's code. Such code is called
+    with arguments of other types, and may do anything: crash, or never return.
     """
 
     def load(self, key: Any) -> Any:
-        """The code for the types ``key``; None, and it is compiled again, where there is none that can be read."""
+        """The code for the types ``key``; None where there is none that can be read: then it is compiled again."""
         try:
             return super().load(key)
-        except Exception:  # pickle raises whatever a damaged file, as of a computer that went off, makes it do
+        except Exception:  # a damaged file, as after a power cut, makes pickle raise anything
             return None
 
     def _load_index(self) -> Any:
@@ -125,7 +125,7 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
             return {}
 
     def save(self, key: Any, data: Any) -> None:
-        """Add the code ``data`` for the types ``key``; where that cannot be had, the next start compiles again."""
+        """Add the code ``data`` for the types ``key``; where it cannot be written, the next start compiles again."""
         try:
             with cache.alone(cache_folder):
                 os.makedirs(self._cache_path, exist_ok=True)
@@ -133,7 +133,7 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
                 known = set(overloads.values())
                 free = (name for n in itertools.count(1) if (name := self._data_name(n)) not in known)
                 name = overloads.get(key) or next(free)
-                # The code first: nobody is to find in the index what is not there yet.
+                # The code first: the index must not name a file that is not there yet.
                 self._save_data(name, data)
                 if key not in overloads:
                     self._save_index(overloads | {key: name})
@@ -142,26 +142,26 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
-    """Keeps to the folder of `cache` where that cannot be written: numba would go on to ``__pycache__``, whose code
-    knows nothing of an edit elsewhere."""
+    """Uses the folder of `cache` even where it cannot be written: numba would fall back to ``__pycache__``, which does
+    not notice an edit elsewhere."""
 
     def ensure_cache_path(self) -> None:
-        """Nothing: who writes creates it."""
+        """Do nothing: `_CacheFile.save` creates it."""
 
 
 CacheImpl._locator_classes = [_Locator]
 
 
 def external(name: str, result: str, *arguments: str) -> Any:
-    """The function ``name`` of the C library for compiled code; types by numba's names, such as "int32".
+    """The function ``name`` of the C library, for compiled code; types are numba's names, such as "int32".
 
-    Compiled functions that call it are cached: its address is looked up when they are loaded.
+    Compiled functions that call it can be cached: its address is looked up when they are loaded.
     """
     return types.ExternalFunction(name, getattr(types, result)(*(getattr(types, one) for one in arguments)))
 
 
 def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:
-    """Decorates what stands for ``function`` where compiled code calls it; with plain Python ``function`` is called."""
+    """Decorate the function that replaces ``function`` in compiled code; plain Python calls ``function`` itself."""
 
     def register(substitute: F) -> F:
         overload(function, strict=False)(lambda *arguments: substitute)
@@ -171,10 +171,10 @@ def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:
 
 
 def entry_of(function: Any, *arguments: Any) -> Any:
-    """The compiled ``function`` for arguments of these types, which must have been called with such before.
+    """The machine code of ``function`` for arguments of these types, for which it must be compiled already.
 
-    It is called without a look at the types of what it is given, which takes longer than a tick where that is tuples of
-    a hundred arrays: so its caller must see to it that they are always the same. Plain Python is itself.
+    It does not check the types of its arguments, which for tuples of a hundred arrays takes longer than a tick: the
+    caller must always pass the same ones. Plain Python is returned as it is.
     """
     if not isinstance(function, Dispatcher):
         return function
@@ -182,17 +182,17 @@ def entry_of(function: Any, *arguments: Any) -> Any:
 
 
 def refusal(function: Any, *arguments: Any) -> str:
-    """Compile ``function`` for the types of ``arguments``, without a call: why numba refuses, or "" if it does not."""
+    """Compile ``function`` for the types of ``arguments``, without calling it: why numba refuses, "" if it does not."""
     if isinstance(function, Dispatcher):
         try:
             function.compile(tuple(numba.typeof(argument) for argument in arguments))
-        except Exception as error:  # numba's own kinds of error are not all that it raises
+        except Exception as error:  # numba raises more than its own errors
             return _reason(str(error)) or repr(error)
     return ""
 
 
 def _reason(text: str) -> str:
-    """What matters of numba's message: the innermost problem, and the first place outside numba that it names."""
+    """The useful part of numba's message: the innermost problem, and the first place outside numba that it names."""
     lines = [line.strip() for line in text.splitlines()]
     first, *more = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))] or [""]
     places = [line for line in lines if line.startswith("File ") and "/numba/" not in line]
@@ -210,12 +210,12 @@ def uncompile(modules: Sequence[ModuleType]) -> None:
 
 
 Vector = tuple[float, float, float]
-"""Three axes; vector algebra on tuples costs no memory."""
+"""Three axes; algebra on tuples allocates nothing."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """Annotation of a field of a NamedTuple that is an array of this shape, modified in place."""
+    """Annotates a field of a NamedTuple that is an array of this shape, modified in place."""
 
     shape: tuple[int, ...]
 
@@ -289,7 +289,7 @@ def _rooms(record_type: Any) -> dict[int, int]:
 def store(record: Any, values: Any) -> None:
     """Write a tuple into the first entries of the vector ``values``; the inverse of `fields`.
 
-    A number in the place of an array fills it.
+    A number in place of an array fills it.
     """
     rooms = _rooms(type(record))
     at = 0
@@ -326,7 +326,7 @@ def _store_compiled(record, values):
 
 
 def moved(state: Any, h: float, rates: Any) -> Any:
-    """``state`` + ``h`` * ``rates``, a NamedTuple of floats: stays in registers, where an array would be slow."""
+    """``state`` + ``h`` * ``rates``, as a NamedTuple of floats: it stays in registers; an array would be slow."""
     return type(state)(*(x + h * rate for x, rate in zip(state, rates, strict=True)))
 
 

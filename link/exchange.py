@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 VERSION = 2
-"""Of transmissions."""
+"""Version of transmissions."""
 
 _HISTORY = 64
 """Records kept of each sender."""
@@ -59,7 +59,7 @@ class Exchange(NamedTuple):
     next_sequence: NDArray[np.int64]
     """(s,): sequence number that the next record of a sender would have."""
     sequence: NDArray[np.int64]
-    """(s, HISTORY): sequence number of each record kept; -1: none."""
+    """(s, HISTORY): sequence number of each record kept; -1 = none."""
     stamp: NDArray[np.int64]
     """(s, HISTORY): simulated time for which its values hold, us."""
     radio_on: NDArray[np.int64]
@@ -171,7 +171,7 @@ _VERSION, _NUMBER, _HEARD, _LAST, _COUNT, _VALUES = range(_HEADER)
 
 
 class Transmission(NamedTuple):
-    """Room for one, as whole numbers and as floats: all are of 8 bytes."""
+    """Room for a transmission, as integers and as floats, both of 8 bytes."""
 
     words: NDArray[np.int64]
     floats: NDArray[np.float64]
@@ -180,7 +180,7 @@ class Transmission(NamedTuple):
 
 
 def new_transmission(records: int, values: int) -> Transmission:
-    """Room for so many records."""
+    """Room for this number of records."""
     words = np.zeros(_HEADER + records * (_PREFIX + values), np.int64)
     return Transmission(words, words.view(np.float64), np.zeros(1, np.int64))
 
@@ -201,7 +201,7 @@ def begin(transmission, number, heard, last, values):
 
 @compiled
 def append(transmission, uav, sequence, stamp_us, radio_on, values):
-    """Append a record; False, and nothing is appended, where a value is not finite: nan never enters the mesh."""
+    """Append a record; False, and nothing is appended, where a value is not finite."""
     for m in range(transmission.words[_VALUES]):
         if not np.isfinite(values[m]):
             return False

@@ -1,7 +1,7 @@
-"""What can be made to fail, in MAVLink's words: the one table of what MAV_CMD_INJECT_FAILURE means here.
+"""Failures: the one table of what MAV_CMD_INJECT_FAILURE can ask for, by unit, instance and type.
 
-Both processes of a UAV read it: the autopilot answers the ground and degrades the radio, the vehicle fails actuators
-and the navigation solution that it sends.
+Both processes of a UAV read it: the autopilot answers the ground station and makes link events of radio failures, the
+vehicle makes faults of the others.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ KINDS = {
 """Kinds of failure by our names."""
 
 EVERY = 0
-"""Instance that stands for all of a unit."""
+"""The instance that stands for all of a unit."""
 
 
 class Size(NamedTuple):
-    """How large a failure is: a parameter of the UAV."""
+    """A parameter of the UAV that gives the size of failures."""
 
     name: str
     default: float
@@ -59,7 +59,7 @@ class Size(NamedTuple):
 
 _ANY = 1e6
 _SIZES_ARRAY = "failure"
-"""Name of the DEBUG_FLOAT_ARRAY in which an autopilot tells its vehicle the sizes."""
+"""Name of the DEBUG_FLOAT_ARRAY in which an autopilot sends its vehicle the sizes."""
 
 AIRFRAME_SIZES = (
     Size("FAIL_EFF", 0.5, 0.0, 1.0, "-", "remaining effectiveness of an actuator"),
@@ -82,7 +82,7 @@ AIRFRAME_SIZES = (
     Size("FAIL_Q", 0.0, -1e2, 1e2, "rad/s", "wrong pitch rate"),
     Size("FAIL_R", 0.0, -1e2, 1e2, "rad/s", "wrong yaw rate"),
 )
-"""In the order in which the autopilot tells its vehicle."""
+"""In the order in which the autopilot sends them to its vehicle."""
 
 LINK_SIZES = (
     Size("FAIL_LOSS", 0.3, 0.0, 1.0, "-", "probability that a record is lost"),
@@ -92,7 +92,7 @@ LINK_SIZES = (
     Size("FAIL_DELAY", 0.1, 0.0, 1e2, "s", "delay beyond the link latency"),
     Size("FAIL_JITTER", 0.1, 0.0, 1e2, "s", "further delay, uniform in [0, jitter]"),
 )
-"""The columns of `Channel`, but for ``blocked``, in their order."""
+"""The columns of ``channel.Channel`` except ``blocked``, in their order."""
 
 SIZES = (*AIRFRAME_SIZES, *LINK_SIZES)
 
@@ -105,15 +105,15 @@ class Unit:
     """In MAVLink, without FAILURE_UNIT_."""
     code: int
     instances: str
-    """Which there are, for people."""
+    """Which instances there are, a text for people."""
     highest: int
     """Largest instance; 0 stands for all of them."""
     on_board: bool
-    """The airframe's, to be answered by the vehicle; otherwise the radio's, the autopilot's own affair."""
+    """True: a failure of the airframe, which the vehicle answers. False: of the radio, which the autopilot answers."""
     parts: tuple[str, ...] = ()
-    """Actuators, the first of which is instance 1."""
+    """Actuators; the first one is instance 1."""
     all_parts: str = ""
-    """What instance 0 is called."""
+    """Name of instance 0."""
 
 
 _SURFACES = ("aileron", "elevator", "rudder")
@@ -142,11 +142,11 @@ UNITS = {"servo": _SERVO, "motor": _MOTOR, "gps": _GPS, "gyro": _GYRO, "radio": 
 
 
 def parts_of(unit: Unit, actuators: Collection[str]) -> dict[int, str]:
-    """The instances of a ``unit`` that aircraft with these ``actuators`` have: number and name.
+    """The instances of a ``unit`` that aircraft with these ``actuators`` have, number and name.
 
-    What takes a surface's place counts. Empty where the unit is no actuator, or where the aircraft have none of it.
+    An actuator in the slot of a surface counts as that surface. Empty for a unit without actuators.
     """
-    # It loads numba, which who only asks for a failure does not need.
+    # It loads numba, which a program that only asks for a failure does not need.
     from ftcc.link.actuators import SLOT
 
     named = {SLOT[actuator]: actuator for actuator in actuators}
@@ -160,7 +160,7 @@ class Meaning(NamedTuple):
     kind: str
     text: str
     sizes: tuple[str, ...] = ()
-    """Parameters that say how large it is."""
+    """Parameters that give its size."""
 
 
 _ACTUATOR: Mapping[str, tuple[str, tuple[str, ...]]] = {
@@ -227,7 +227,7 @@ def meaning_of(unit: float, kind: float, instance: float) -> Meaning | None:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failure of the airframe that is to happen."""
+    """A failure of the airframe, as commanded."""
 
     meaning: Meaning
     instance: int
@@ -236,7 +236,7 @@ class Failure:
 
 
 def failure_messages(uav: int, meaning: Meaning, instance: int, at_us: int, sizes: Sequence[float]) -> tuple[Any, Any]:
-    """What an autopilot tells its vehicle: the sizes and the simulated time (0 = at once), then the command."""
+    """The two messages of an autopilot to its vehicle: sizes and simulated time (us; 0 = at once), then the command."""
     sizes_array = float_array(at_us, _SIZES_ARRAY, sizes)
     command = dialect.MAVLink_command_long_message(
         uav,

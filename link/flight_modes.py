@@ -1,4 +1,4 @@
-"""Modes of an autopilot: as numbers that compiled functions understand, and as a PX4-type ground station names them."""
+"""Flight modes of an autopilot: as numbers for compiled functions, and as PX4-type ground stations name them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ __all__ = ["HOLD", "MISSION", "NAMES", "OFFBOARD", "code_of", "custom_mode", "mo
 MISSION = 0
 """The scheme flies."""
 HOLD = 1
-"""What the UAV refers to stands still, neighbours are ignored; they are still told."""
+"""The UAV's own reference stands still, and it ignores its in-neighbours; its out-neighbours still hear it."""
 OFFBOARD = 2
-"""The scheme flies; what the UAV refers to by itself comes from the ground."""
+"""The scheme flies; the UAV's own reference comes from the ground."""
 
 NAMES = {MISSION: "mission", HOLD: "hold", OFFBOARD: "offboard"}
 
@@ -24,7 +24,7 @@ def custom_mode(mode: int) -> int:
 
 
 def mode_of(main: float, sub: float) -> int | None:
-    """Our mode, or None where PX4's means nothing here."""
+    """Our flight mode for PX4's main and sub mode; None where there is none."""
     for mode, (its_main, its_sub) in _PX4.items():
         if main == its_main and (sub == its_sub or its_main == 6):
             return mode
@@ -32,11 +32,11 @@ def mode_of(main: float, sub: float) -> int | None:
 
 
 def code_of(name: str) -> int | None:
-    """The custom mode of a mode by its name; None if there is no such mode."""
+    """The custom mode of the flight mode with this name; None if there is none."""
     return next((custom_mode(mode) for mode, its_name in NAMES.items() if its_name == name), None)
 
 
 def mode_called(custom: int) -> str:
-    """The name of the mode that a HEARTBEAT tells."""
+    """The name of the flight mode in a HEARTBEAT's custom mode."""
     mode = mode_of(custom >> 16 & 0xFF, custom >> 24)
     return "unknown" if mode is None else NAMES[mode]

@@ -1,7 +1,7 @@
-"""Folders in which the program keeps something of the user's: compiled code, running swarms, keys.
+"""The folders of the user in which the program keeps compiled code, running swarms and keys.
 
-They are where the user's environment says (``FTCC_...``, ``XDG_...``, ``HOME``). Where such a folder cannot be written,
-as in a container without a home, a private one below the system's temporary directory stands in, with a warning.
+The environment says where they are (``FTCC_...``, ``XDG_...``, ``HOME``). Where such a folder cannot be written, as in
+a container without a home, a private one below the system's temporary directory replaces it, with a warning.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from pathlib import Path
 __all__ = ["NoFolderError", "cache_folder", "config_folder", "matplotlib_folder", "runtime_folder"]
 
 _warned: set[str] = set()
-"""Warnings that this process has given."""
+"""Warnings that this process has issued."""
 
 
 class NoFolderError(OSError):
-    """There is no folder to write into; the text says which variable would name one."""
+    """There is no folder to write into; the text says which variable can name one."""
 
 
 def cache_folder(below: str) -> Path:
     """The folder ``below`` that of the caches: ``FTCC_CACHE_DIR``, or ``ftcc`` in the user's caches.
 
-    Processes that this one starts use the same one.
+    Child processes use the same one.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def runtime_folder() -> Path:
 
 
 def config_folder() -> Path:
-    """``ftcc`` in the user's configuration; nothing stands in for it, and it is not created.
+    """``ftcc`` in the user's configuration; nothing replaces it, and it is not created.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def _of_user(variable: str, below_home: str) -> Path | None:
 
 
 def _copy(source: Path, folder: Path) -> None:
-    """What an installation holds that can only be read serves as a beginning; root's or one's own, as it is code."""
+    """Start from what a read-only installation holds, if it is root's or the user's own, since it is code."""
     with contextlib.suppress(OSError, shutil.Error):
         if source.stat().st_uid in (0, os.geteuid()) and not any(folder.iterdir()):
             shutil.copytree(source, folder, dirs_exist_ok=True)

@@ -1,7 +1,7 @@
 """MAVLink 2 frames of the five messages of a tick, written and read by compiled code, byte for byte as pymavlink does.
 
-Numbers, lengths, fields and checksum seeds come from pymavlink's dialect when this module is imported. A frame that is
-not one of the five, or that is not perfect, is not read here: whoever finds one gives its whole datagram to pymavlink.
+Numbers, lengths, fields and checksum seeds come from pymavlink's dialect when this module is imported. This
+module does not read other messages or faulty frames: the caller gives the whole datagram to pymavlink.
 """
 
 from __future__ import annotations
@@ -58,22 +58,22 @@ class _Header(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """What is particular to the frames of one message."""
+    """The layout of the frames of one message."""
 
     number: int
     """Message id."""
     length: int
     """Bytes of a payload with its extensions."""
     seed: int
-    """What the checksum ends with (CRC_EXTRA)."""
+    """CRC_EXTRA, with which the checksum ends."""
     first_float: int
     """Where its float fields begin, bytes."""
     floats: int
-    """How many follow each other there."""
+    """Number of float fields there."""
     first_extension: int
-    """Where further ones begin, bytes."""
+    """Where further float fields begin, bytes."""
     extensions: int
-    """How many."""
+    """Number of floats there."""
 
 
 def _fields(message: Any) -> list[tuple[str, str, int, int]]:
@@ -92,7 +92,7 @@ def layout(message: Any) -> Layout:
     Raises
     ------
     ValueError
-        If its floats stand in more than two places, which none of those of a tick does.
+        If its floats stand in more than two places; those of a tick do not.
     """
     runs: list[list[int]] = []
     for _, code, at, count in _fields(message):
@@ -111,7 +111,7 @@ def layout(message: Any) -> Layout:
 
 
 def place(message: Any, field: str) -> int:
-    """Where a field begins in a payload that is seen as numbers of the field's own size.
+    """Index of a field in a payload that is read as numbers of the field's own size.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def new_payload() -> Payload:
 
 
 def _checksum_table() -> NDArray[np.int64]:
-    """What each byte adds to the checksum of MAVLink (CRC-16/MCRF4XX)."""
+    """The table of MAVLink's checksum (CRC-16/MCRF4XX), by byte."""
     table = np.zeros(256, np.int64)
     for byte in range(256):
         value = byte
@@ -212,9 +212,9 @@ def _finite(octets, shape):
 
 @compiled_apart
 def write_frame(payload, shape, system, component, sequence, out, at):
-    """Write a message with the layout ``shape`` into the datagram ``out`` from byte ``at`` on; where it ends.
+    """Write a message with the layout ``shape`` into the datagram ``out`` from byte ``at`` on.
 
-    -1, and nothing is written, if a float in it is nan or infinite, or was too large for float32.
+    Returns where it ends; -1, and writes nothing, if a float in it is nan, infinite or was too large for float32.
     """
     if not _finite(payload.octets, shape):
         return -1
@@ -240,8 +240,8 @@ def read_frame(data, at, end, payload):
     Returns
     -------
     number, next : int
-        The message id and where the next frame begins; (-1, at) if there is no perfect frame of one of the five
-        messages, without a signature and with finite floats.
+        The message id and where the next frame begins; (-1, at) unless there is a valid, unsigned frame of one of the
+        five messages with finite floats.
     """
     if end - at < _HEADER + 1 + _CHECKSUM:
         return -1, at

@@ -1,4 +1,4 @@
-"""The sockets by which an autopilot speaks with the ground: to one address, or with whoever calls."""
+"""The sockets of an autopilot towards ground stations: to one address, or for all that call."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ LISTENERS: tuple[Address, ...] = ((LOOPBACK, 14550), (LOOPBACK, 14540))
 """Where ground stations and offboard programs listen by custom."""
 
 _CALLERS = 32
-"""Callers that are remembered at a time."""
+"""Callers remembered at a time, at most."""
 _SILENCE = 10.0
-"""Wall time after which a caller that says nothing is forgotten, s."""
+"""Wall time after which a silent caller is forgotten, s."""
 _QUIET = 2.5
-"""Wall time after which one makes room for a newcomer, s: it has left out two of its own HEARTBEATs."""
+"""Wall time after which a silent caller makes room for a new one, s: two of its HEARTBEATs are missing."""
 _REFUSED = 1.5
-"""Wall time for which an address counts as deserted after a refused datagram, s: beyond the next HEARTBEAT."""
+"""Wall time for which an address counts as closed after a refused datagram, s: longer than to the next HEARTBEAT."""
 _DATAGRAMS_PER_READ = 64
 _LARGEST_DATAGRAM = 4096
 _FULL = 1200
-"""Bytes after which a further datagram is begun: no network fragments that."""
+"""Bytes after which a further datagram begins: no network fragments so few."""
 
 _LENIENT = (
     "SET_ATTITUDE_TARGET",
@@ -37,18 +37,18 @@ _LENIENT = (
     "MISSION_ITEM",
     "MISSION_ITEM_INT",
 )
-"""Messages in which clients put nan where they ask for nothing."""
+"""Messages in which nan means "not used"."""
 
 
 class Peer:
-    """Somebody on the ground, as far as one autopilot's one socket is concerned."""
+    """A ground station or program, as one socket of one autopilot sees it."""
 
     def __init__(self, link: socket.socket, address: Address, connected: bool, codec: Codec) -> None:
         self.address = address
         self.heard = time.monotonic()
         """When it was last heard, wall s (monotonic)."""
         self.remembered = True
-        """Whether it is spoken to unasked; else it is answered, and no more."""
+        """Whether it gets telemetry; otherwise it gets answers alone."""
         self._socket = link
         self._connected = connected
         self._codec = codec
@@ -56,20 +56,20 @@ class Peer:
 
     @property
     def there(self) -> bool:
-        """Whether somebody listens, as far as is known."""
+        """Whether it listens, as far as is known."""
         return time.monotonic() - self._refused > _REFUSED
 
     def refused(self) -> None:
-        """Nobody listens there."""
+        """Note that nobody listens there."""
         self._refused = time.monotonic()
 
     def answered(self) -> None:
-        """Somebody does."""
+        """Note that it was heard."""
         self.heard = time.monotonic()
         self._refused = float("-inf")
 
     def send(self, *messages: Any) -> None:
-        """Send ``messages``, several to a datagram; what the system cannot take is lost, as a datagram may be."""
+        """Send ``messages``, several to a datagram; a datagram that the system cannot take is lost."""
         datagram = b""
         for message in messages:
             datagram += self._codec.pack(message)
@@ -101,8 +101,8 @@ class GcsSocket:
     port : int
         Local port; 0 lets the system choose.
     to : (host, port), optional
-        With it the socket is connected: the one peer is spoken to unasked, and datagrams of others are dropped by the
-        kernel. Without, whoever sends a valid message becomes a peer for as long as it goes on talking.
+        With it the socket is connected: this peer gets telemetry, and the kernel drops datagrams of others. Without,
+        each sender of a valid message becomes a peer for as long as it keeps sending.
     signing : Signing, optional
         See `Codec`.
     """
@@ -116,7 +116,7 @@ class GcsSocket:
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self.codec = Codec(system, component, signing, _LENIENT)
-        """Reads what comes; its counters say what was dropped."""
+        """Parses what arrives, and counts what it drops."""
         self._peers: dict[Address, Peer] = {}
         here, anywhere = (LOOPBACK, "0.0.0.0") if family == socket.AF_INET else ("::1", "::")
         self._socket.bind((here if to is None or is_loopback(to[0]) else anywhere, port))
@@ -131,7 +131,7 @@ class GcsSocket:
 
     @property
     def peers(self) -> list[Peer]:
-        """Who is spoken to."""
+        """Those that get telemetry."""
         return list(self._peers.values())
 
     def receive(self) -> Iterator[tuple[Peer, Any]]:
@@ -155,7 +155,7 @@ class GcsSocket:
                     yield peer, message
 
     def _peer(self, address: Address) -> Peer:
-        """The caller at ``address``; where all places are taken by callers that talk it is not remembered."""
+        """The caller at ``address``; it is not remembered where active callers take all places."""
         if address in self._peers:
             return self._peers[address]
         self.forget_the_silent()
@@ -170,7 +170,7 @@ class GcsSocket:
         return caller
 
     def forget_the_silent(self) -> None:
-        """Callers that have not been heard for long are peers no more."""
+        """Forget callers that have been silent for long."""
         if self._to is None:
             late = time.monotonic() - _SILENCE
             self._peers = {address: peer for address, peer in self._peers.items() if peer.heard > late}

@@ -1,4 +1,4 @@
-"""The communication graph: who hears whom, with which weight, and what follows from it.
+"""The communication graph: senders, receivers and weights, and what follows from them.
 
 Weights are a_ij of receiver i for sender j, as in the monograph; leaders receive nothing that the schemes use.
 """
@@ -15,11 +15,11 @@ __all__ = ["Assumption", "Graph", "GraphError"]
 
 
 class GraphError(ValueError):
-    """A graph that breaks the assumption that a scheme declares."""
+    """The graph breaks an assumption of the scheme."""
 
 
 class Assumption(Enum):
-    """What a scheme demands of the topology; the value is the sentence that a user reads."""
+    """What a scheme requires of the topology; the value is the sentence that a user reads."""
 
     LEADERS_REACH_ALL = "every follower is reached from at least one leader by a directed path"
     UNDIRECTED_LEADERS_REACH_ALL = (
@@ -60,11 +60,11 @@ class Graph:
         return self.followers + self.leaders
 
     def senders(self, receiver: int) -> list[int]:
-        """Ids of those whom ``receiver`` hears, in the swarm's order."""
+        """Ids of the in-neighbours of ``receiver``, in the swarm's order."""
         return [uav for uav in self.uavs if (receiver, uav) in self.weights]
 
     def receivers(self, sender: int) -> list[int]:
-        """Ids of those who hear ``sender``, in the swarm's order."""
+        """Ids of the out-neighbours of ``sender``, in the swarm's order."""
         return [uav for uav in self.uavs if (uav, sender) in self.weights]
 
     @property

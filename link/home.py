@@ -1,4 +1,4 @@
-"""Where on earth the swarm's local frame lies, so that maps have something to show."""
+"""The place on earth of the swarm's local frame, for maps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TURN = 3_600_000_000
 
 @dataclass(frozen=True)
 class Home:
-    """Where on earth the origin of the swarm's local frame lies."""
+    """The place on earth of the origin of the local frame."""
 
     latitude: float
     """deg."""

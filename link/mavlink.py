@@ -43,7 +43,7 @@ LOOPBACK = "127.0.0.1"
 _DATAGRAMS_PER_READ = 64
 _LARGEST_DATAGRAM = 4096
 _LARGEST = 3.4e38
-"""What float32 can hold."""
+"""Largest magnitude that float32 holds, rounded down."""
 
 
 class Endpoint:
@@ -56,11 +56,11 @@ class Endpoint:
     port : int
         Local port; 0 lets the system choose.
     peer : (host, port), optional
-        With a peer the socket is connected: datagrams of others are dropped by the kernel. Without, it only receives.
+        With a peer the socket is connected, and the kernel drops datagrams of others. Without, it only receives.
     only : collection of int, optional
-        Ports on loopback from which datagrams are read; those of others are dropped and counted.
+        Ports on loopback from which datagrams are read; others are dropped and counted.
     host : str
-        Local address; loopback unless asked otherwise.
+        Local address; loopback by default.
     """
 
     def __init__(
@@ -75,10 +75,10 @@ class Endpoint:
         self.system, self.component = system, component
         self.codec = Codec(system, component)
         self.sequence = np.zeros(1, np.int64)
-        """(1,): sequence number of the next message; shared with whoever else sends by this socket."""
+        """(1,): sequence number of the next message; shared with compiled code that sends by this socket."""
         self._only = frozenset((LOOPBACK, port) for port in only) if only is not None else None
         self.strangers = 0
-        """Datagrams dropped because of where they came from."""
+        """Datagrams dropped because of their sender."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.bind((host, port))
@@ -94,7 +94,7 @@ class Endpoint:
         self._socket.close()
 
     def enlarge_buffer(self) -> None:
-        """Give the socket room for many senders: the kernel drops what does not fit."""
+        """Enlarge the receive buffer for many senders: the kernel drops what does not fit."""
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
 
     def send(self, *messages: Any) -> None:
@@ -109,9 +109,9 @@ class Endpoint:
         try:
             self._socket.send(datagram)
         except ConnectionRefusedError:
-            return  # The peer is not there (yet, or any more); whoever waits for its answer notices.
+            return  # The peer is not there (yet, or any more): there will be no answer.
         except OSError:
-            return  # The buffer is full, or there is no way there at present: lost, as a datagram may be.
+            return  # The buffer is full, or there is no route at present: the datagram is lost.
 
     def pack(self, *messages: Any) -> bytes:
         """``messages`` as one datagram, with the next sequence numbers.
@@ -136,7 +136,7 @@ class Endpoint:
             except ConnectionRefusedError:
                 continue
             except OSError:
-                break  # No way there at present; who waits for an answer notices.
+                break  # No route at present: there will be no answer.
             if self._only is not None and sender not in self._only:
                 self.strangers += 1
                 continue
@@ -145,7 +145,7 @@ class Endpoint:
 
 
 def ending_message() -> Any:
-    """HEARTBEAT by which vehicle and autopilot tell each other that their UAV ends here."""
+    """The HEARTBEAT by which vehicle and autopilot report to each other that their UAV is lost."""
     return dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_FIXED_WING,
         dialect.MAV_AUTOPILOT_INVALID,

@@ -1,8 +1,8 @@
-"""The mesh: one Zenoh peer per process, linked along the edges of the communication graph and to nobody else.
+"""The mesh: one Zenoh peer per process, linked along the edges of the communication graph and to no others.
 
 No multicast, no gossip, no router, loopback only. A process puts one transmission on the mesh per exchange and
-subscribes to those processes whose UAVs its own hear. What arrives is kept by Zenoh's thread, which writes to a pipe:
-so a process sleeps until it arrives, on the mesh and on its sockets at once.
+subscribes to the processes of its in-neighbours. Zenoh's thread keeps what arrives and writes to a pipe: so a process
+can wait for the mesh and for its sockets at once.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ _RING = 16
 """Transmissions kept of each sender in real time."""
 
 _RINGS = 64
-"""Bytes in the pipe, at most: there are one or two."""
+"""Bytes read from the pipe at a time: there are one or two."""
 _RUNTIME = "(" + ", ".join(f"{pool}: (handover: app)" for pool in ("acc", "rx", "tx", "net")) + ")"
-"""One thread of Zenoh's for all its work: handing a record from one to the other costs more than sending it."""
+"""One thread for all of Zenoh's work: to hand a record from one to another costs more than to send it."""
 
 
 class Mesh:
-    """The peer of the process ``own``; processes are called by the ids of their first UAVs.
+    """The peer of the process ``own``; the id of its first UAV is the name of a process.
 
     Parameters
     ----------
     swarm : str
         Name of the run; part of every key, so that two swarms never mix.
     own : name of this process.
-    hears : names of the processes whose transmissions are wanted.
-    heard_by : names of those that want this one's; the peer is ready when all of them have subscribed.
+    hears : names of the processes whose transmissions this one receives.
+    heard_by : names of those that receive this one's; the peer is ready when all of them have subscribed.
     listen : port of this peer, or None if nobody connects to it.
     connect : ports of the peers to connect to.
     ordered : deliver every transmission in order (lockstep) instead of the newest ones (real time).
@@ -55,7 +55,7 @@ class Mesh:
         ordered: bool,
     ) -> None:
         os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
-        import zenoh  # after the fork: a child of a process that had opened Zenoh never sends
+        import zenoh  # after the fork: the child of a process that has opened Zenoh never sends
 
         self._zenoh = zenoh
         prefix = f"ftcc/{swarm}"
@@ -87,7 +87,7 @@ class Mesh:
         self._tokens = [self._session.liveliness().declare_token(f"{prefix}/{own}/hears/{sender}") for sender in hears]
 
     def _keeper(self, sender: int) -> Callable[[Any], None]:
-        """What Zenoh's thread does with a sample of ``sender``: keep it, and ring."""
+        """The handler, in Zenoh's thread, of samples of ``sender``: keep it, and write to the pipe."""
         arrived = self._arrived[sender]
 
         def keep(sample: Any) -> None:
@@ -104,17 +104,17 @@ class Mesh:
             self._awaited.discard(str(sample.key_expr))
 
     def fileno(self) -> int:
-        """For ``select``: can be read where something has arrived since the last `receive`."""
+        """For ``select``: readable once something has arrived since the last `receive`."""
         return self._bell
 
     @property
     def ready(self) -> bool:
-        """Whether all who hear this process have subscribed."""
+        """Whether all that receive from this process have subscribed."""
         return not self._awaited
 
     @property
     def awaited(self) -> list[str]:
-        """Keys of those who have not subscribed yet."""
+        """Keys of those that have not subscribed yet."""
         return sorted(self._awaited)
 
     def publish(self, payload: bytes) -> None:
@@ -123,8 +123,8 @@ class Mesh:
 
     def receive(self) -> list[tuple[int, bytes]]:
         """The transmissions that have arrived since the last call, with their senders; those of one in order."""
-        # In this order: what arrives after this rings again. If Zenoh's thread is just about to write, there is nothing
-        # to read yet, and the bell rings once more in vain.
+        # In this order: what arrives from here on is written again. If Zenoh's thread is just about to write, there is
+        # nothing to read yet, and the process wakes up once more in vain.
         self._rung = False
         with contextlib.suppress(BlockingIOError):
             os.read(self._bell, _RINGS)

@@ -18,7 +18,7 @@ _SHARED = 4
 
 
 class PortError(OSError):
-    """A port that was asked for is in use, or none is free."""
+    """A requested port is in use, or none is free."""
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,16 @@ class UavPorts:
     """Ports of one UAV."""
 
     vehicle: int
-    """The vehicle's end of the pair."""
+    """The vehicle's, towards its autopilot."""
     autopilot: int
-    """The autopilot's end of the pair."""
+    """The autopilot's, towards its vehicle."""
     ground: int
-    """Where the autopilot hears whoever calls."""
+    """Where the autopilot listens for ground stations that call."""
     mesh: int
     telemetry: int
-    """From which the autopilot tells the station."""
+    """From which the autopilot sends telemetry to our station."""
     truth: int
-    """From which the vehicle tells the station."""
+    """From which the vehicle sends the truth to our station."""
 
 
 @dataclass
@@ -45,11 +45,11 @@ class PortBlock:
     base: int
     uavs: tuple[int, ...]
     guard: socket.socket | None = field(default=None, repr=False)
-    """Listens on the block's first TCP port, which nobody else needs: whoever holds it holds the block."""
+    """Listens on the block's first TCP port, which has no other use: its holder holds the block."""
 
     @property
     def station(self) -> int:
-        """Where the ground station hears all vehicles."""
+        """Where our ground station listens to all vehicles and autopilots."""
         return self.base
 
     @property
@@ -67,26 +67,26 @@ class PortBlock:
         return _SHARED + _PER_UAV * len(self.uavs)
 
     def release(self) -> None:
-        """Let others have the block."""
+        """Release the block."""
         if self.guard is not None:
             self.guard.close()
             self.guard = None
 
 
 def _refused(error: OSError, port: int) -> OSError | None:
-    """What keeps a port from being bound, where that is not somebody who has it."""
+    """Why a port cannot be bound, where it is not in use."""
     if error.errno == errno.EACCES:
         return PortError(f"port {port}: only root may have the ports below 1024")
     return None if error.errno == errno.EADDRINUSE else error
 
 
 def _require_loopback() -> None:
-    """Refuse to begin where loopback is down: sockets can be bound there, and nothing that is sent arrives."""
+    """Refuse to begin where loopback is down: sockets can be bound there, but nothing arrives."""
     from ftcc.link.mavlink import LOOPBACK
 
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect((LOOPBACK, _FIRST))  # asks for the way there, sends nothing
+            probe.connect((LOOPBACK, _FIRST))  # looks up the route, sends nothing
         except OSError as error:
             raise PortError(
                 f"processes cannot speak by loopback ({LOOPBACK}): {error.strerror}; `ip link set lo up` starts it"
@@ -94,8 +94,8 @@ def _require_loopback() -> None:
 
 
 def _in_use(base: int, size: int) -> int | None:
-    """A port of the block that somebody has bound, beside the guard's own."""
-    from ftcc.link.mavlink import LOOPBACK  # who only lists running swarms needs no MAVLink
+    """A port of the block that is in use, beside the guard's own."""
+    from ftcc.link.mavlink import LOOPBACK  # listing running swarms needs no MAVLink
 
     for port in range(base, base + size):
         for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
@@ -130,7 +130,7 @@ def _guard(base: int) -> socket.socket | None:
 
 
 def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
-    """A free block for ``uavs``: the one at ``base`` if given, else the first free one.
+    """Reserve a free block for ``uavs``: the one at ``base`` if given, else the first free one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What every process of a swarm shares: how it is told what to be, waits, logs, reports and ends."""
+"""What every process of a swarm shares: its setting, waiting for sockets, its log, telemetry's pace, its end."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _TELEMETRY = 0.1
 RESEND = 0.05
 """Wall time after which a datagram that was not answered is sent again (lockstep), s."""
 _STALL = 10.0
-"""Wall time without progress after which a process says for whom it waits, s."""
+"""Wall time without progress after which a process reports for which UAVs it waits, s."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a process knows of its run beside its own UAVs."""
+    """What a process gets of its run beside the specifications of its UAVs."""
 
     swarm: str
     timing: Timing
@@ -46,13 +46,13 @@ class Setting:
     folder: Path
     """The run's folder."""
     listeners: tuple[tuple[str, int], ...] = ()
-    """Where other ground stations may listen; they are sent to, their ports are never bound."""
+    """Addresses where other ground stations may listen: they get telemetry, their ports are never bound."""
     key: Path | None = None
-    """Key file; with it everything towards the ground is signed, and what comes from there must be."""
+    """Key file: with it messages to ground stations are signed, and theirs must be."""
     home: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the origin of the local frame lies: latitude, longitude (deg), altitude of z = 0 (m)."""
     id_offset: int = 0
-    """What UAVs' ids have added towards the ground."""
+    """Added to a UAV's id to make its MAVLink system id towards the ground."""
     epoch_us: int = 0
     """Unix time that counts as simulated time 0, us."""
 
@@ -62,7 +62,7 @@ class Setting:
 
 
 class Waiter:
-    """Waits for any of several sockets and pipes, and has what arrives handled."""
+    """Waits for any of several sockets and pipes, and calls their handlers."""
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
@@ -79,7 +79,7 @@ class Waiter:
         return bool(ready)
 
     def fileno(self) -> int:
-        """A descriptor that can be read where one of them can."""
+        """A descriptor that is readable when one of them is."""
         return self._selector.fileno()
 
     def close(self) -> None:
@@ -87,11 +87,11 @@ class Waiter:
 
 
 class Telemetry:
-    """When to report: at 10 Hz simulated or wall, whichever is slower, and at the end."""
+    """When telemetry is due: at 10 Hz simulated or wall, whichever is slower, and at the end."""
 
     def __init__(self, timing: Timing) -> None:
         self.every = max(1, round(_TELEMETRY / timing.period))
-        """Ticks between two that may be reported."""
+        """Ticks between two at which telemetry may be due."""
         self._end = timing.ticks
         self._last = -1e9
 
@@ -117,7 +117,7 @@ class Stall:
         self._said = False
 
     def progress(self) -> None:
-        """There is progress."""
+        """Note that there is progress."""
         self._since = time.monotonic()
         self._said = False
 
@@ -147,7 +147,7 @@ def _log(path: Path) -> Iterator[None]:
 def process_main(name: str, pipe: Connection, setting: Setting, main: Callable[..., None], specs: Any) -> None:
     """Body of every child process: ``main(specs, setting, gate)`` under a log; exit code 1 if it raises.
 
-    Ctrl-C is the launcher's business: it reaches the children as a message.
+    Ctrl-C is for the launcher: it reaches the children as a message.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,6 +1,6 @@
 """What each process writes while it flies: its part of the recording and the log of events.
 
-A part is an Arrow IPC stream: readable to its last batch after ``kill -9``, which a Parquet file is not.
+A part is an Arrow IPC stream: readable to its last batch after ``kill -9``, unlike a Parquet file.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ ROWS = 500
 """Rows in a record batch: 5 s at 100 Hz is what a killed process loses at most."""
 
 _SPARE = 256
-"""Rows beyond them, in which a tick surely finds room: one for each UAV that may be heard."""
+"""Further rows, so that one tick always fits: one for each possible in-neighbour."""
 _FLUSH = 0.9
-"""Wall time after which rows are written though there is room for more, s."""
+"""Wall time after which rows are written although there is room for more, s."""
 
 AIRCRAFT_LOST = "aircraft lost: "
-"""How an event begins that tells why a UAV was lost."""
+"""How the text of an event begins that reports why a UAV was lost."""
 
 _INTEGERS = ("uav", "sender")
 
@@ -73,7 +73,7 @@ LINK_COLUMNS = (
 
 
 def part_path(folder: Path, uav: int, role: str) -> Path:
-    """Where a UAV's ``role`` ("vehicle", "autopilot" or "links") is written."""
+    """The file for a UAV's ``role``: "vehicle", "autopilot" or "links"."""
     return Path(folder) / "parts" / f"{uav}-{role}.arrows"
 
 
@@ -94,10 +94,10 @@ def arrow_schema(columns: Iterable[Column], metadata: Mapping[str, str] | None =
 
 
 class Rows(NamedTuple):
-    """Rows that the k UAVs of a process have filled and that were not written yet."""
+    """Rows that the k UAVs of a process have filled and that are not written yet."""
 
     values: NDArray[np.float64]
-    """(k, ROWS and some to spare, c)."""
+    """(k, ROWS and some spare ones, c)."""
     filled: NDArray[np.int64]
     """(k,): rows in use."""
 
@@ -127,7 +127,7 @@ class PartWriter:
     """
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        import pyarrow as pa  # who writes nothing needs no Arrow
+        import pyarrow as pa  # slow to load, and not needed where nothing is recorded
 
         self._pa = pa
         self.path = Path(path)
@@ -161,10 +161,10 @@ class Recorder:
 
     Parameters
     ----------
-    paths : the file of each UAV; None: nothing is recorded of it.
+    paths : the file of each UAV; None: it is not recorded.
     columns : of all of them.
     places : where each column stands in a row, ascending, the last one at its end; by default one after the other.
-    on_trouble : called with the reason where a part cannot be written any further: it ends there, the flight goes on.
+    on_trouble : called with the reason when a part cannot be written any further: it ends there, the flight goes on.
     """
 
     def __init__(
@@ -192,15 +192,15 @@ class Recorder:
         self.rows.filled[:] = 0
 
     def _give_up(self, i: int, error: OSError) -> None:
-        """What is written of a part stays; readers stop at the last batch that is whole."""
+        """Stop writing; readers of the part stop at its last complete batch."""
         path = self._parts.pop(i).path
         self._on_trouble(f"{path.name} is not written any further: {error.strerror or error}")
 
     def write_if_due(self) -> None:
-        """Write what has waited for about a second of wall time.
+        """Write the rows that have waited for about a second of wall time.
 
-        To be called at ticks that are the same for all processes: so what its two processes have written of a UAV ends
-        at the same instant, while they fly no faster than the clock.
+        Call it at the same ticks in all processes: then both parts of a UAV end at the same instant, while the swarm
+        flies no faster than the clock.
         """
         if time.monotonic() - self._written > _FLUSH:
             self.write()
@@ -230,7 +230,7 @@ def read_part(path: Path) -> Any:
             try:
                 batches.append(stream.read_next_batch())
             except (StopIteration, pa.ArrowInvalid, OSError, EOFError):
-                # The end, or the batch in whose middle the writer was killed.
+                # The end, or a batch cut off when the writer was killed.
                 whole = False
         return pa.Table.from_batches(batches, schema=stream.schema)
 
@@ -239,7 +239,7 @@ class EventLog:
     """Appends events to a file, a JSON object a line, each written through at once."""
 
     trouble = ""
-    """Why events could not be written; empty where all were."""
+    """Why events could not be written; empty where all are."""
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
@@ -264,7 +264,7 @@ class EventLog:
 
 
 def read_events(path: Path) -> list[dict[str, Any]]:
-    """The events of a log in order of simulated time; a last line that was not written completely is left out."""
+    """The events of a log in order of simulated time; an incomplete last line is left out."""
     events = []
     if not Path(path).exists():
         return []

@@ -1,4 +1,4 @@
-"""Angles within half a turn, and attitudes as quaternions, scalar first, as all sides read them from the messages."""
+"""Angles within half a turn, and attitudes as quaternions, scalar first, as MAVLink carries them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["body_attitude", "body_axes", "nearest_turn", "quaternion_product", "
 def nearest_turn(angle, to):
     """``angle`` plus the whole turns that bring it within half a turn of ``to`` (rad); itself, bit for bit, if it is.
 
-    What is not finite stays what it is.
+    nan and inf are returned as they are.
     """
     away = angle - to
     if not math.pi < abs(away) < math.inf:
@@ -23,7 +23,7 @@ def nearest_turn(angle, to):
 
 @compiled
 def wrapped(angle):
-    """``angle`` (rad) within half a turn of 0: of a difference of two angles the shorter way."""
+    """``angle`` (rad) within half a turn of 0: for a difference of two angles, the shorter way."""
     return nearest_turn(angle, 0.0)
 
 

@@ -26,7 +26,7 @@ _UNITS = 100_000
 _SIGNATURE = 6
 """Bytes of a signature: the beginning of a SHA-256."""
 _TOLERANCE = 60 * _UNITS
-"""By how much a sender that is heard for the first time may be behind."""
+"""By how much the stamps of a new sender may be behind."""
 
 Stream = tuple[int, int, int]
 """Link, system and component of a sender."""
@@ -69,7 +69,7 @@ def default_key_file() -> Path:
     Raises
     ------
     NoFolderError
-        Where there is no home: a key is nothing for a temporary folder.
+        Where there is no home: a key does not belong into a temporary folder.
     """
     return config_folder() / "mavlink.key"
 
@@ -93,7 +93,7 @@ def new_key_file(path: Path) -> None:
         with file:
             file.write(secrets.token_urlsafe(32) + "\n")
     except OSError as error:
-        path.unlink()  # the half of a key would be in the way of the next one
+        path.unlink()  # half a key would block the next attempt
         raise KeyFileError(f"{path}: cannot be written: {error.strerror or error}; give another FILE") from None
 
 
@@ -118,7 +118,7 @@ def read_key(path: Path) -> bytes:
 
 
 def stamps_file(key: Path, system: int, component: int) -> Path:
-    """Where a MAVLink component keeps the stamps of what it heard: beside the key file."""
+    """The file, beside the key file, in which a MAVLink component keeps the stamps that it heard."""
     return key.with_name(f"{key.name}.stamps") / f"{system}-{component}.json"
 
 
@@ -133,7 +133,7 @@ class Signing:
     ----------
     key : 32 bytes
     memory : Path, optional
-        Where stamps are kept, so that a command that was heard before a restart is refused after it.
+        The file of the stamps: with it, a command heard before a restart is refused after it.
     link : int
         Which of the links of its system this is, 0..255: stamps rise on each of them.
 
@@ -169,7 +169,7 @@ class Signing:
                 raise KeyFileError(f"{memory}: holds no time stamps ({error}); remove it to start afresh") from None
 
     def can_remember(self) -> bool:
-        """Whether stamps can be written down; makes the folder for them where it can."""
+        """Whether stamps can be written; makes their folder where it can."""
         if self._memory is None:
             return False
         with contextlib.suppress(OSError):
@@ -197,14 +197,14 @@ class Signing:
         if known is None and behind > _TOLERANCE:
             return Refusal("late", *stream[1:], behind / _UNITS)
         if known is not None and stamp <= known:
-            # A clock that was put back is told from a repetition by how far it is behind.
+            # A large lag means that the sender's clock was set back, a small one a repetition.
             return Refusal("late" if behind > _TOLERANCE else "repeated", *stream[1:], behind / _UNITS)
         self._heard[stream] = stamp
         self._dirty = True
         return None
 
     def remember(self) -> None:
-        """Write the stamps down; to be called before a command is obeyed, and at the end.
+        """Write the stamps; call it before a command is executed, and at the end.
 
         Raises
         ------

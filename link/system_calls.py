@@ -1,8 +1,8 @@
-"""The few calls of the operating system that a tick needs, for compiled code and plain Python alike.
+"""The few system calls that a tick needs, for compiled code and plain Python.
 
 A tick sends and receives datagrams without going back to Python: compiled code calls the C library itself. Each
-function here is written twice, for the two ways of running it, and calls the same function of the library in both.
-None of them waits, but `wait` and `pause`.
+function here is written twice, once for compiled code and once for plain Python; both call the same function of the
+library. Only `wait` and `pause` wait.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _nanosleep = external("nanosleep", "int32", "voidptr", "voidptr")
 def receive(descriptor, buffer):
     """Read the next datagram of a socket into ``buffer``: its length, at most that of the buffer, or -1 for none.
 
-    -1 too where the socket only tells that an earlier datagram was refused.
+    Also -1 where the socket only reports that an earlier datagram was refused.
     """
     return _library.recv(descriptor, buffer.ctypes.data, buffer.size, _DONT_WAIT)
 
@@ -53,7 +53,7 @@ def _receive(descriptor, buffer):
 
 
 def send(descriptor, buffer, length):
-    """Send the first ``length`` bytes of ``buffer`` as a datagram; what cannot be sent is lost, as a datagram may be.
+    """Send the first ``length`` bytes of ``buffer`` as a datagram; one that cannot be sent is lost.
 
     Returns the number of bytes sent, or -1.
     """
@@ -66,10 +66,10 @@ def _send_compiled(descriptor, buffer, length):
 
 
 def wait(polled, milliseconds):
-    """Wait until one of several descriptors can be read, at most so many ms; the number of those that can.
+    """Wait until one of several descriptors is readable, at most so many ms; the number of those that are.
 
     ``polled`` is an (n, 2) int32 array that the library reads as its ``struct pollfd``: descriptor, and events in the
-    lower half of the second number; what happened comes in the upper half.
+    lower half of the second number; the library sets the upper half.
     """
     return _library.poll(polled.ctypes.data, polled.shape[0], milliseconds)
 

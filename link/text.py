@@ -1,4 +1,4 @@
-"""How numbers are written for people, in whatever process."""
+"""Numbers as texts for people."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ __all__ = ["as_seconds"]
 
 
 def as_seconds(time_us: int) -> str:
-    """A simulated time (us) in s: every digit, and no more."""
+    """A simulated time (us) in s, with all its digits and no more."""
     return f"{time_us / 1e6:.6f}".rstrip("0").rstrip(".")

@@ -17,10 +17,10 @@ def ticks_a_second(period_us):
 
 @compiled
 def tick_of(stamp_us, period_us):
-    """The tick whose time is ``stamp_us`` but for what a stamp in whole ms leaves out; -1 if there is none.
+    """The tick whose time, rounded down to whole ms, is ``stamp_us``; -1 if there is none.
 
     MAVLink's time_boot_ms is the time rounded down. As long as a period is at least 1 ms, no two ticks share a ms: the
-    tick is found without doubt, and its time is tick * period, not the stamp.
+    tick is unique, and its time is tick * period, not the stamp.
     """
     tick = (stamp_us + period_us - 1) // period_us
     return tick if stamp_us >= 0 and tick * period_us // 1000 == stamp_us // 1000 else -1
@@ -55,7 +55,7 @@ class Timing(NamedTuple):
 
     @property
     def report_every(self) -> int:
-        """Ticks between recorded rows on the links: a second, as nearly as the period allows."""
+        """Ticks between recorded rows of links: a second, as nearly as the period allows."""
         return int(ticks_a_second(self.period_us))
 
     @property

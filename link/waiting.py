@@ -1,7 +1,7 @@
-"""Why the compiled flight of a process goes back to Python: something has come, or is to be done, that is not a tick.
+"""The causes for which the compiled flight of a process returns to Python.
 
-The ticks of a process are flown in one compiled function, which keeps all that it knows in arrays and can be called
-again at any time. It returns one of these causes.
+One compiled function flies the ticks of a process. Its whole state is in arrays, so it can be called again at any time.
+It returns one of these causes.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ __all__ = ["ATTEND", "DATAGRAM", "FLOWN", "GO_ON", "HELD", "MAIL", "WORK"]
 GO_ON = 0
 """Nothing: the flight goes on."""
 ATTEND = 1
-"""Something else than a datagram between vehicle and autopilot can be read, or it is time to look around."""
+"""A descriptor other than those between vehicle and autopilot is readable, or it is time to check the launcher."""
 DATAGRAM = 2
-"""A datagram has come that is not of a tick, for the UAV ``wire.whose``."""
+"""A datagram has arrived for the UAV ``wire.whose`` that compiled code does not read."""
 MAIL = 3
-"""The mesh has something, which is needed now."""
+"""A transmission has arrived on the mesh, and is needed now."""
 WORK = 4
-"""A tick was flown after which there is something to be done: to be put on the mesh, written, or told."""
+"""A tick is flown after which Python has work: a transmission, rows to write, events to report."""
 HELD = 5
-"""The next tick may not begin yet."""
+"""The gate holds the next tick."""
 FLOWN = 6
-"""There is nothing left to fly."""
+"""The flight is over."""

@@ -67,7 +67,7 @@ _POSITION_AT = StateMessage._fields.index("x")
 """Where the fields of LOCAL_POSITION_NED begin in a `StateMessage`."""
 _TARGET_THRUST = AttitudeTarget._fields.index("thrust")
 
-# Where the fields stand. Those that follow each other are written one after the other.
+# Where the fields stand; those of one group follow each other.
 _Q1 = place(dialect.MAVLink_attitude_quaternion_message, "q1")
 _X = place(dialect.MAVLink_local_position_ned_message, "x")
 _CONTROLS = place(dialect.MAVLink_hil_actuator_controls_message, "controls")
@@ -115,7 +115,7 @@ class Wire(NamedTuple):
     sequence: NDArray[np.int64]
     """(k,): sequence number of the next message."""
     sent: NDArray[np.uint8]
-    """(k, n): the last datagram, to be sent again where its answer does not come."""
+    """(k, n): the last datagram, to be sent again where there is no answer."""
     sent_length: NDArray[np.int64]
     """(k,): its bytes; 0 before the first."""
     payload: Payload
@@ -127,11 +127,11 @@ class Wire(NamedTuple):
     whose: NDArray[np.int64]
     """(1,): index of the UAV for which it is."""
     polled: NDArray[np.int32]
-    """(k + 2, 2): what is waited for, see `system_calls.wait`: the sockets, then what else wakes the process up."""
+    """(k + 2, 2): the descriptors to wait for, see `system_calls.wait`: the sockets, others, and the mesh."""
 
 
 def new_wire(systems: Sequence[int], component: int) -> Wire:
-    """One end of the wire for UAVs that send as these MAVLink systems; its sockets are those of `connect`."""
+    """One end of the wire for UAVs that send as these MAVLink systems; `connect` gives it its sockets."""
     k = len(systems)
     polled = np.zeros((k + 2, 2), np.int32)
     polled[:, 0] = -1
@@ -156,8 +156,8 @@ def connect(wire: Wire, endpoints: Sequence[Endpoint], others: int, mesh: int = 
 
     Parameters
     ----------
-    endpoints : in the order of the UAVs. What they send by themselves is counted with what is sent here.
-    others : descriptor of everything else that wakes the process up.
+    endpoints : in the order of the UAVs. They share the sequence numbers of this wire.
+    others : descriptor for everything else that wakes the process up.
     mesh : descriptor of the mesh; -1: none.
     """
     wire.polled[:, 0] = [*(endpoint.fileno() for endpoint in endpoints), others, mesh]
@@ -173,9 +173,9 @@ def keep_sent(wire: Wire, i: int, datagram: bytes) -> None:
 
 
 def split(wire: Wire, codec: Codec) -> Iterator[Any]:
-    """The datagram at hand as pymavlink reads it: its messages one after the other.
+    """Let pymavlink read the datagram at hand, message by message.
 
-    None stands for messages of a tick, which then are at hand as if they had come alone.
+    None stands for messages of a tick: they are then the datagram at hand, as if they had arrived alone.
     """
     messages = codec.parse(wire.datagram[: wire.length[0]].tobytes())
     while messages:
@@ -194,13 +194,13 @@ def split(wire: Wire, codec: Codec) -> Iterator[Any]:
 
 @compiled
 def is_readable(wire, n):
-    """Whether row ``n`` of ``polled`` can be read, or has an error that reading takes away."""
+    """Whether row ``n`` of ``polled`` is readable, or has an error that reading clears."""
     return wire.polled[n, 1] >> 16 != 0
 
 
 @compiled
 def receive_datagram(wire, i):
-    """The next datagram for UAV ``i``; False if none has come."""
+    """Receive the next datagram for UAV ``i``; False if there is none."""
     wire.whose[0] = i
     wire.length[0] = receive(wire.socket[i], wire.datagram)
     return wire.length[0] >= 0
@@ -215,7 +215,7 @@ def send_again(wire, i):
 
 @compiled
 def _append(wire, i, shape, at):
-    """Append the message at hand to UAV ``i``'s datagram; where it ends, -1 if it cannot be sent."""
+    """Append the message at hand to UAV ``i``'s datagram; returns where it ends, -1 if it cannot be sent."""
     end = write_frame(wire.payload, shape, wire.system[i], wire.component[i], wire.sequence[i], wire.sent[i], at)
     wire.sequence[i] = wire.sequence[i] + 1 & 0xFF
     return end
@@ -223,7 +223,7 @@ def _append(wire, i, shape, at):
 
 @compiled
 def _send(wire, i, end):
-    """Send UAV ``i``'s datagram of ``end`` bytes; False where it holds what must not be sent."""
+    """Send UAV ``i``'s datagram of ``end`` bytes; False, and nothing is sent, where ``end`` is negative."""
     if end < 0:
         wire.sent_length[i] = 0
         return False

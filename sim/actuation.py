@@ -13,7 +13,7 @@ __all__ = ["NO_AUTOTHROTTLE", "Autothrottle", "actuate", "has_autothrottle", "ho
 
 
 class Autothrottle(NamedTuple):
-    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V) within limits."""
+    """The vehicle's own speed hold, which replaces the commanded thrust: thrust + gain (airspeed - V) within limits."""
 
     gain: float
     """N per m/s; 0 = none."""
@@ -30,9 +30,9 @@ _GAIN = Autothrottle._fields.index("gain")
 
 @compiled
 def latch(fleet, i, command):
-    """Bring ``command`` (4,) into force, or the one that came before it by the vehicle's delay.
+    """Put ``command`` (4,), rad and N, into force; with a delay, the command of that many samples before.
 
-    The first one counts as all that came before it, unless the line holds commands from the start.
+    The first command counts as all those before it, unless the delay line is filled from the start.
     """
     line = fleet.delayed[i]
     last = line.shape[0] - 1
@@ -51,7 +51,7 @@ def latch(fleet, i, command):
 
 @compiled_within
 def has_autothrottle(fleet, i):
-    """Whether vehicle ``i`` holds its speed by itself."""
+    """Whether an autothrottle sets the thrust of vehicle ``i``."""
     return fleet.autothrottle[i, _GAIN] > 0.0
 
 
@@ -77,7 +77,7 @@ def _immediate(fleet, i, actuator, rate):
 
 @compiled
 def actuate(fleet, i, time):
-    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force."""
+    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force: actuator positions with faults."""
     for actuator in range(len(ACTUATORS)):
         effectiveness, bias, rate = fault_in_force(fleet, i, actuator, time)
         if _immediate(fleet, i, actuator, rate):
@@ -115,7 +115,7 @@ def _swung(before, speed, target, frequency, damping, since):
 
 @compiled
 def stroke(fleet, i, actuator, time, step):
-    """Acting deflection at the beginning, middle and end of a ``step`` (s); lag and rate limit are integrated exactly.
+    """Acting deflection at the beginning, middle and end of a ``step`` (s), with lag and rate limit integrated exactly.
 
     A fault is taken at ``time`` (s), the middle of the step.
     """

@@ -42,7 +42,7 @@ def _empty_table(specs: Sequence[VehicleSpec], name: str, width: int) -> NDArray
 
 
 def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
-    """Arrays for ``specs``, which share one plant, before the first tick."""
+    """The fleet of ``specs``, which share one plant, before the first tick."""
     k = len(specs)
     plant = find(specs[0].plant)
     command = np.array([spec.command for spec in specs], np.float64)

@@ -53,7 +53,7 @@ def _set_autothrottle(fleet, i):
 
 @compiled
 def actuate(fleet, i, time):
-    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; to be called after each latch."""
+    """Set what acts on vehicle ``i`` at ``time`` (s) under the command in force; call it after each latch."""
     _set_autothrottle(fleet, i)
     plant_actuate(fleet, i, time)
 
@@ -84,7 +84,7 @@ def _blow(fleet, i, step):
 
 @compiled
 def _disturb(fleet, i, time, out):
-    """Write into ``out`` what disturbs vehicle ``i``, without the gust of (9.33), in the order of ``DISTURBANCES``."""
+    """Write the disturbances of vehicle ``i``, without the gust of (9.33), into ``out``, see ``DISTURBANCES``."""
     disturb(fleet, i, time, out)
     if _MOVES and fleet.still[i] == 0:
         _move_air(fleet, i, time, out)
@@ -155,7 +155,7 @@ def _point_truth(fleet, i, time, out):
 
 @compiled
 def truth(fleet, i, time, out):
-    """Write the state of vehicle ``i`` at ``time`` (s) into ``out``, in the order of ``plant.TRUTH``."""
+    """Write the true state of vehicle ``i`` at ``time`` (s) into ``out`` (13,), in the order of ``plant.TRUTH``."""
     fill(out, 0.0)
     if fleet.point[i] == 1:
         _point_truth(fleet, i, time, out)
@@ -166,7 +166,7 @@ def truth(fleet, i, time, out):
 
 @compiled
 def conditions(fleet, i, time, out):
-    """Write what is wrong with vehicle ``i`` at ``time`` (s) into ``out``, in the order of `plants.conditions_of`."""
+    """Write faults and disturbances of vehicle ``i`` at ``time`` (s) into ``out``, see `plants.conditions_of`."""
     count = len(_SLOTS)
     for n, slot in enumerate(_SLOTS):
         out[n], out[count + n], _ = fault_in_force(fleet, i, slot, time)
@@ -175,10 +175,10 @@ def conditions(fleet, i, time, out):
 
 @compiled
 def measure(fleet, i, tick, seed, true, out):
-    """``true`` with the noise of vehicle ``i`` at this tick."""
+    """Write ``true`` (13,) with the measurement noise of vehicle ``i`` at this tick into ``out`` (13,)."""
     if add_noise(true, fleet.noise[i], seed, fleet.uav[i], tick, out):
         if fleet.noise[i, ALPHA] > 0.0:
-            # An angle of attack that is measured itself: the pitch angle follows from it.
+            # Where the angle of attack is measured, the pitch angle follows from it.
             out[THETA] = out[GAMMA] + out[ALPHA]
         _complete(out)
 

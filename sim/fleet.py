@@ -39,7 +39,7 @@ class Fleet(NamedTuple):
     delayed: NDArray[np.float64]
     """(k, d, 4): commands that wait for ``d`` further samples before they are in force, the oldest first."""
     waiting: NDArray[np.int64]
-    """(k,): 1 once the line holds commands: from the first one on, or from the start."""
+    """(k,): 1 once the delay line is filled: by the first command, or from the start."""
     fault_before_lag: NDArray[np.float64]
     """(k,): 1 where a fault acts at the input of the lag, 0 where it acts on the position behind it."""
     faults: NDArray[np.float64]
@@ -47,7 +47,7 @@ class Fleet(NamedTuple):
     fault_count: NDArray[np.int64]
     """(k,): rows in use."""
     deflection: NDArray[np.float64]
-    """(k, 4): what acted last."""
+    """(k, 4): the acting deflections of the last step."""
     held: NDArray[np.float64]
     """(k, 4): what a stuck actuator holds."""
     held_since: NDArray[np.float64]
@@ -87,7 +87,7 @@ class Fleet(NamedTuple):
     airframe: NDArray[np.float64]
     """(k, m): the plant's ``Parameters``."""
     datum: NDArray[np.float64]
-    """(k,): altitude from which that in the state's message counts, m: a float32 is fine near its zero alone."""
+    """(k,): altitude from which that in the state message counts, m: float32 is exact only near zero."""
     offset: NDArray[np.float64]
     """(k,): lateral position y of a plant that flies in a vertical plane, m."""
     target: NDArray[np.float64]

@@ -1,7 +1,7 @@
 """The flight of a vehicle process, compiled: from the commands that answer the last states to the next states.
 
 A template, see `link.compiled`: the free name ``cycle`` is the module of the flight of one vehicle on a plant.
-`plants.flight_of` gives this module with it filled in. `tick` lists what a tick does; the rest waits for it.
+`plants.flight_of` gives this module with it filled in. `tick` lists the steps of a tick; `fly` waits for each tick.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ cycle: Any = globals()["cycle"]
 _conditions = cycle.conditions
 
 _DATAGRAMS = 64
-"""Read of one autopilot at a time, at most: a flood must not hold up a tick for ever."""
+"""Read from one autopilot at a time, at most: a flood must not delay a tick for ever."""
 _LOOK = 20
 """Longest wait before the clock is looked at, ms."""
 _SHORT = 1e-3
-"""Waits below it are slept, s: `wait` knows whole milliseconds."""
+"""Shorter waits are slept, s: `wait` takes whole milliseconds."""
 _BEHIND = 0.1
-"""What a swarm in lockstep may be behind its pace and catch up, wall s: beyond it, simulated time is slower."""
+"""Lag behind its pace that a swarm in lockstep catches up, wall s; beyond it, the pace is put back."""
 
 
 @compiled_apart
@@ -97,7 +97,7 @@ def tick(group, timing):
 
 @compiled_within
 def bring_into_force(group, timing, i):
-    """The newest command of vehicle ``i``; one that does not answer its last state is late."""
+    """Put the newest command of vehicle ``i`` into force; one that does not answer its last state is late."""
     if group.tick[0] == 0:
         return
     fleet = group.fleet
@@ -141,7 +141,7 @@ def _write_truth(group, i, now_us, out):
 
 @compiled_within
 def record(group, timing, i):
-    """A row of the recording, where one is due."""
+    """Fill a row of the recording of vehicle ``i``, where one is due."""
     if group.tick[0] % timing.record_every != 0:
         return
     now_us = _now(group, timing)
@@ -176,7 +176,7 @@ def report_truth(group, timing):
 
 @compiled_within
 def _read_command(group, timing, i):
-    """The time (us) of the state that the command in the datagram at hand for vehicle ``i`` answers.
+    """Read a command for vehicle ``i`` in the datagram at hand; returns the time (us) of the state that it answers.
 
     -1 if there is no command, -2 if it is too old.
     """
@@ -206,12 +206,12 @@ def _read_command(group, timing, i):
 
 @compiled_within
 def take(group, timing, i):
-    """Take in the datagram at hand for vehicle ``i``: its command counts, if it is one; else its cause."""
+    """Take in the datagram at hand for vehicle ``i``: GO_ON if it is a command, DATAGRAM if not, see `link.waiting`."""
     stamp = _read_command(group, timing, i)
     if stamp == -1:
         return DATAGRAM
     if group.alive[i] == 0:
-        # Whose aircraft is lost says so again, as often as it is asked.
+        # A lost aircraft reports that again, each time it is asked.
         send_again(group.wire, i)
     else:
         group.answered[i] = max(group.answered[i], stamp)
@@ -220,7 +220,7 @@ def take(group, timing, i):
 
 @compiled_within
 def listen(group, timing, until):
-    """Read what the autopilots sent: until all have answered ``until`` (us); if it is negative, all that came."""
+    """Read what the autopilots sent, until all have answered ``until`` (us); if that is negative, all there is."""
     for i in range(group.alive.shape[0]):
         for _ in range(_DATAGRAMS):
             if until >= 0 and (group.alive[i] == 0 or group.answered[i] >= until):
@@ -251,7 +251,7 @@ def due_at(group, timing):
 
 @compiled_within
 def ask_again(group, wanted, now):
-    """Send states again whose answers do not come: a datagram may be lost."""
+    """Send states again that are not answered: a datagram may be lost."""
     if wanted < 0 or now - group.since[0] < RESEND:
         return
     group.since[0] = now
@@ -262,7 +262,7 @@ def ask_again(group, wanted, now):
 
 @compiled_within
 def something_to_do(group, timing):
-    """Whether Python has something to do after this tick: rows to write, losses and events to tell, truth to send."""
+    """Whether Python has something to do after this tick: rows to write, losses and events to report, truth to send."""
     if group.fleet.events.used[0] > 0 or group.lost[0] > 0 or group.tick[0] % group.truth_every[0] == 0:
         return True
     if group.tick[0] % ticks_a_second(timing.period_us) == 0:
@@ -272,10 +272,10 @@ def something_to_do(group, timing):
 
 @compiled_to_wait
 def fly(group, timing, lockstep):
-    """Fly tick after tick until Python has something to do; why, see `link.waiting`.
+    """Fly tick after tick until Python has something to do; returns the cause, see `link.waiting`.
 
-    A tick waits for its time; in lockstep also for the answers to the last states, and a swarm that has fallen behind
-    its pace goes on from where it is.
+    A tick waits for its time, in lockstep also for the answers to the last states. In lockstep a swarm that has fallen
+    behind its pace continues at that pace, without catching up.
     """
     others = group.alive.shape[0]
     while True:
@@ -306,7 +306,7 @@ def fly(group, timing, lockstep):
         elif 0.0 < rest < _SHORT:
             pause(rest, group.room)
         else:
-            # Until the tick is due nothing else is waited for: what has come is read then, all at once.
+            # Before the tick is due, wait for other descriptors alone: the sockets are read then, all at once.
             first, milliseconds = (others, min(int(rest * 1e3), _LOOK)) if rest > 0.0 else (0, _LOOK)
             ask_again(group, wanted, now)
             wait(group.wire.polled[first:], milliseconds)

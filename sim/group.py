@@ -1,4 +1,4 @@
-"""The vehicles of a process as plain arrays: all that their compiled flight works on, from datagram to datagram."""
+"""The vehicles of a vehicle process as plain arrays: the fleet, its wire, and what a tick works on."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class VehicleGroup(NamedTuple):
     fleet: Fleet
     wire: Wire
     rows: Rows
-    """Of the recording."""
+    """Rows of the recording."""
     alive: NDArray[np.int64]
     """(k,): 0 once a vehicle is lost."""
     why: NDArray[np.int64]
-    """(k,): why, a key of ``plant.LOST``."""
+    """(k,): why a vehicle is lost, a key of ``plant.LOST``; 0 = reported, or not lost."""
     lost: NDArray[np.int64]
     """(1,): vehicles lost in flight whose loss is not reported yet."""
     true: NDArray[np.float64]
@@ -50,7 +50,7 @@ class VehicleGroup(NamedTuple):
     controls: NDArray[np.float64]
     """(k, 4): the commands in force, fractions of travel."""
     travels_by: NDArray[np.int64]
-    """(k,): how commands travel to a vehicle, see `wire`."""
+    """(k,): how commands travel to a vehicle: BY_ACTUATORS, BY_ATTITUDE or BY_POSITION of `wire`."""
     delays: NDArray[np.int64]
     """(k,): samples by which a command acts later than it has to."""
     received: NDArray[np.float64]
@@ -76,13 +76,13 @@ class VehicleGroup(NamedTuple):
     truth_every: NDArray[np.int64]
     """(1,): ticks between two times at which a truth report may be due."""
     tick: NDArray[np.int64]
-    """(1,): the next one."""
+    """(1,): the next tick."""
     limit: NDArray[np.int64]
-    """(1,): the last one that may be flown at present."""
+    """(1,): the last tick that may be flown at present."""
     pace: NDArray[np.float64]
     """(3,): wall time (monotonic, s) at which a tick is due, that tick, and simulated seconds per second."""
     attention: NDArray[np.float64]
-    """(1,): wall time from which on Python wants to look around, s."""
+    """(1,): wall time at which Python checks launcher and clock again, s."""
     since: NDArray[np.float64]
     """(1,): wall time since which answers are awaited, s."""
     room: NDArray[np.int64]

@@ -1,8 +1,8 @@
 """The vehicle's own inner loop: load factor and bank by the surfaces of the 6-DoF aircraft (not in the monograph).
 
 Shaped demands, an integral on the measured load factor, the kinematics (2.3) inverted for body rates, the moments
-(2.4)-(2.7) inverted for surfaces. Damping and stiffness terms are fed with the commanded angle of attack and rates: to
-cancel the natural ones by measured values through the surfaces' lag would lose the aircraft.
+(2.4)-(2.7) inverted for surfaces. Damping and stiffness terms use the commanded angle of attack and rates: cancelling
+the natural ones by measured values through the surfaces' lag would be unstable.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _K_P, _K_Q, _K_R = 8.0, 10.0, 4.0
 
 
 class LoopState(NamedTuple):
-    """What the loop remembers."""
+    """State of the loop."""
 
     n_r: float
     """Shaped load factor."""
@@ -48,7 +48,7 @@ def _clip(value, low, high):
 
 @compiled
 def load_factor(V, alpha, elevator, thrust, a):
-    """What an accelerometer along the lift axis shows, in g: (L + T sin(alpha)) / (m g)."""
+    """Load factor along the lift axis, as an accelerometer measures it: (L + T sin(alpha)) / (m g)."""
     lift = 0.5 * a.rho * V * V * a.S * (a.CL0 + a.CLa * alpha + a.CLde * elevator)
     return (lift + thrust * math.sin(alpha)) / (a.m * a.g)
 
@@ -112,7 +112,7 @@ def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gam
         + (chi_dot * cos_g * sin_m + gamma_dot * cos_m) / cos_b
     )
 
-    # Angular accelerations without what the gyroscopic terms give, (2.4)-(2.5).
+    # Angular accelerations less the gyroscopic terms, (2.4)-(2.5).
     inertia = a.Ix * a.Iz - a.Ixz * a.Ixz
     c1 = ((a.Iy - a.Iz) * a.Iz - a.Ixz * a.Ixz) / inertia
     c2 = a.Ixz * (a.Ix - a.Iy + a.Iz) / inertia

@@ -1,7 +1,7 @@
-"""Obstacles: zones along the flight that are to be passed above, and how far above them a vehicle flies.
+"""Obstacles: zones along the flight that vehicles must pass above, and their clearance.
 
-A zone is a rule of the mission and no wall: a vehicle that enters one is reported, and flies on. So what its law does
-stays comparable, and its neighbours do not lose it for a reason that is none of theirs; a claim on clearance fails.
+A zone is a rule of the mission and not a wall: a vehicle that enters one is reported, and flies on. So its law stays
+comparable, and its neighbours do not lose it; a claim on its clearance fails.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ftcc.link.events import note
 __all__ = ["ENTERED", "Obstacle", "clearance", "entered_text", "watch", "zones_of"]
 
 ENTERED = 1
-"""Kind of happening: a vehicle entered the zone of that number, counted from 1, for the first time."""
+"""Kind of event: a vehicle entered the zone of that number, counted from 1, for the first time."""
 
 
 class Obstacle(NamedTuple):
@@ -28,7 +28,7 @@ class Obstacle(NamedTuple):
 
 
 def zones_of(obstacles: tuple[Obstacle, ...]) -> np.ndarray:
-    """The obstacles as the compiled functions want them, (n, 3)."""
+    """The obstacles as an array (n, 3) for compiled functions."""
     return np.array(obstacles, np.float64).reshape(len(obstacles), len(Obstacle._fields))
 
 
@@ -44,7 +44,7 @@ def clearance(zones, x, z):
 
 @compiled
 def watch(zones, entered, events, i, now_us, x, z):
-    """Note when vehicle ``i`` enters a zone for the first time; ``entered`` (k, n) keeps which ones it did."""
+    """Note an event when vehicle ``i`` enters a zone for the first time, and mark the zone in ``entered`` (k, n)."""
     for n in range(zones.shape[0]):
         if entered[i, n] == 0 and zones[n, 0] < x < zones[n, 1] and z < zones[n, 2]:
             entered[i, n] = 1
@@ -52,5 +52,5 @@ def watch(zones, entered, events, i, now_us, x, z):
 
 
 def entered_text(uav: int, number: int) -> str:
-    """The event for people."""
+    """The text of that event."""
     return f"UAV {uav} entered obstacle zone {number}"

@@ -64,7 +64,7 @@ def places(plant: str, obstacles: bool = False) -> tuple[int, ...]:
 
 
 def truth_array(plant: str) -> tuple[str, ...]:
-    """Contents of the DEBUG_FLOAT_ARRAY "truth" that a vehicle sends to the station, and to nobody else."""
+    """Contents of the DEBUG_FLOAT_ARRAY "truth", which a vehicle sends to our ground station alone."""
     actuators = in_slots(find(plant).ACTUATORS)
     return (
         *TRUTH,
@@ -131,7 +131,7 @@ class Vehicles:
         return self.tick * self.timing.period_us
 
     def fly(self) -> None:
-        """All ticks, or until everything is lost or the launcher stops the flight."""
+        """Fly all ticks, or until all vehicles are lost or the launcher stops the flight."""
         cause = ATTEND
         flown = -1
         while cause != FLOWN:

@@ -22,13 +22,13 @@ __all__ = ["VehicleSpec", "placeholder"]
 
 @dataclass(frozen=True)
 class VehicleSpec:
-    """One vehicle."""
+    """A vehicle."""
 
     uav: int
     kind: str
     """"aircraft", or "reference_point": the kinematic stand-in for a leader's aircraft."""
     plant: str
-    """What the aircraft of the swarm are, see `plants`."""
+    """Name of the plant of all aircraft of the swarm, see `plants`."""
     airframe: tuple[float, ...]
     """The plant's ``Parameters``."""
     initial: tuple[float, ...]
@@ -66,7 +66,7 @@ class VehicleSpec:
     """A `reference_point`'s first target, see ``messages.PositionTarget``."""
     navigation_faults: tuple[NavigationFault, ...] = ()
     datum: float = 0.0
-    """Altitude from which that in the state's message counts, m."""
+    """Altitude from which that in the state message counts, m."""
     obstacles: tuple[Obstacle, ...] = ()
     """The same for all vehicles."""
 
@@ -77,7 +77,7 @@ class VehicleSpec:
 
 
 def placeholder(plant: str) -> VehicleSpec:
-    """A vehicle that flies nowhere, to compile with."""
+    """A vehicle that is never flown, to compile with."""
     flown = find(plant)
     return VehicleSpec(
         uav=1,

@@ -16,10 +16,10 @@ __all__ = ["Trim", "TrimError", "steady_climb", "trim"]
 _SCALE = np.array([0.03, -0.2, 20.0])
 """Typical angle of attack, elevator and thrust: the unknowns are solved for as multiples of these."""
 _SCALE_CLIMB = np.array([0.03, -0.2, 0.1])
-"""Likewise angle of attack, elevator and flight-path angle."""
+"""The same for angle of attack, elevator and flight-path angle."""
 
 _LARGEST_ALPHA = 0.8
-"""Beyond this the polynomial airframe has solutions that no aircraft has, rad."""
+"""Beyond this the polynomials of the airframe have solutions without physical meaning, rad."""
 
 
 class TrimError(ValueError):
@@ -61,7 +61,7 @@ def trim(airframe: Airframe, V: float, d1: float = 0.0, d2: float = 0.0, d3: flo
 @functools.cache
 @kept
 def _trim(parameters: tuple[float, ...], V: float, d1: float, d2: float, d3: float) -> list[float]:
-    from scipy.optimize import root  # takes longer to import than everything else here
+    from scipy.optimize import root  # takes longer to import than all else here
 
     airframe = Airframe(*parameters)
 

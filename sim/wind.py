@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 AIR = ("wind_along", "wind_right", "wind_up")
-"""The last of a plant's ``DISTURBANCES``: what gusts and turbulence make of the air's velocity."""
+"""The last of a plant's ``DISTURBANCES``: velocity of the air by gusts and turbulence."""
 
 AIR_CHANNELS = (("wind", "m/s"), ("gust", "m/s"), *((name, "m/s") for name in AIR))
 """Mean wind V_m and gust A of (9.33), then `AIR`."""
@@ -51,7 +51,7 @@ class DiscreteGust(NamedTuple):
     right: float
     up: float
     until: float = math.inf
-    """From here on it falls as it has risen; time + rise: the whole 1-cosine of CS-25.341."""
+    """From this time on it falls as it rose, s; time + rise: the full 1-cosine of CS-25.341."""
 
 
 class Turbulence(NamedTuple):
@@ -62,7 +62,7 @@ class Turbulence(NamedTuple):
     bandwidth: tuple[float, float, float] = (1.0,) * 3
     """V / L, rad/s."""
     step_us: int = 1000
-    """Integration step of the plant, for which a value is held."""
+    """Integration step of the plant, us, for which a value is held."""
     seed: int = 0
 
 
@@ -155,7 +155,7 @@ def _cosine(since, rise):
 
 @compiled
 def moving_air(fleet, i, component, time):
-    """How fast the air moves at vehicle ``i`` and ``time`` (s): a component, see `AIR`, m/s."""
+    """Velocity component of the air, see `AIR`, at vehicle ``i`` and ``time`` (s), m/s."""
     speed = 0.0
     for n in range(fleet.gusts.shape[1]):
         gust = fields(DiscreteGust, fleet.gusts[i, n])

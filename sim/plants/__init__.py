@@ -29,7 +29,7 @@ def name_of(plant: ModuleType) -> str:
 
 @functools.cache
 def find(name: str) -> ModuleType:
-    """The module of that plant, checked for completeness.
+    """The module of this plant, checked for completeness.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def find(name: str) -> ModuleType:
 
 
 def conditions_of(plant: str) -> tuple[tuple[str, str], ...]:
-    """Names and units of what only the simulator knows of a vehicle: effectiveness, bias, disturbances."""
+    """Names and units of a vehicle's true faults and disturbances: effectiveness, bias, disturbances."""
     module = find(plant)
     return (
         *((f"{name}_effectiveness", "-") for name in module.ACTUATORS),

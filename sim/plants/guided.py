@@ -1,4 +1,4 @@
-"""The 6-DoF aircraft, eqs. (2.1)-(2.7), under its own inner loop: thrust, load factor and bank are demanded of it.
+"""The 6-DoF aircraft, eqs. (2.1)-(2.7), under its own inner loop: it takes thrust, load factor and bank as demands.
 
 Motion over the ground in true wind: forces are those of the air velocity. Faults act on the three demands, ahead of the
 loop (`ftcc.sim.inner_loop`); the surfaces behind it have a lag, a rate limit and stops of their own.

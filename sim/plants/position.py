@@ -1,7 +1,7 @@
 """The aircraft as a point, eqs. (2.15)-(2.16): thrust, load factor and bank; drag (9.32) in the wind of (9.33).
 
-Integrated as one acceleration of the velocity, which has no singularity in climb: an inner loop of the attitude is
-taken for granted, `ftcc.sim.plant` gives it its lag. That loop holds load factor and bank against gusts and turbulence
+Integrated as one acceleration of the velocity, which has no singularity in climb. An inner attitude loop is assumed;
+`ftcc.sim.actuation` gives it its lag. That loop holds load factor and bank against gusts and turbulence
 too: these change the drag, and the direction of the forces, which are those of the air velocity. Wind and gust of
 (9.33) enter the drag alone, as printed. States and what is measured are over the ground.
 """
@@ -110,7 +110,7 @@ _LEAST_AIRSPEED = 1.0
 
 @compiled
 def drag(airspeed, load_factor, a):
-    """Drag (N), eq. (9.32), with its g^2, which makes the induced part negligible."""
+    """Drag (N), eq. (9.32), with g^2 as printed, which makes the induced part negligible."""
     square = max(airspeed, _LEAST_AIRSPEED) * max(airspeed, _LEAST_AIRSPEED)
     lift = load_factor * a.m * a.g
     return 0.5 * a.rho * square * a.S * a.CD0 + 2.0 * a.kd * a.kn * a.kn * lift * lift / (
