@@ -19,10 +19,12 @@ from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim import plants
+from ftcc.sim.actuation import NO_AUTOTHROTTLE, Autothrottle
 from ftcc.sim.airframe import scaled
+from ftcc.sim.disturbances import Disturbance
 from ftcc.sim.obstacles import Obstacle
-from ftcc.sim.plant import TRUTH, Autothrottle, Disturbance, Guards
-from ftcc.sim.spec import NO_AUTOTHROTTLE, VehicleSpec
+from ftcc.sim.plant import TRUTH, Guards
+from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["nominal_model", "true_airframe", "vehicles_of"]
 
