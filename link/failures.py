@@ -55,6 +55,13 @@ class Size(NamedTuple):
     high: float
     unit: str
     meaning: str
+    scenario_name: str = ""
+    """What scenarios and Python call it, where that is more than the name without FAIL_ in small letters."""
+
+    @property
+    def keyword(self) -> str:
+        """What Python calls it: the `scenario_name`, or the name without FAIL_ in small letters."""
+        return self.scenario_name or self.name.removeprefix("FAIL_").lower()
 
 
 _ANY = 1e6
@@ -62,10 +69,10 @@ _SIZES_ARRAY = "failure"
 """Name of the DEBUG_FLOAT_ARRAY in which an autopilot sends its vehicle the sizes."""
 
 AIRFRAME_SIZES = (
-    Size("FAIL_EFF", 0.5, 0.0, 1.0, "-", "remaining effectiveness of an actuator"),
+    Size("FAIL_EFF", 0.5, 0.0, 1.0, "-", "remaining effectiveness of an actuator", "effectiveness"),
     Size("FAIL_BIAS", 0.0, -_ANY, _ANY, "rad or N", "bias of an actuator"),
-    Size("FAIL_EFF_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the loss, 0 = step"),
-    Size("FAIL_BIAS_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the bias, 0 = step"),
+    Size("FAIL_EFF_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the loss, 0 = step", "effectiveness_onset"),
+    Size("FAIL_BIAS_RATE", 0.0, 0.0, 1e3, "1/s", "exponential onset of the bias, 0 = step", "bias_onset"),
     Size("FAIL_SLEW", 0.1, 1e-6, _ANY, "rad/s or N/s", "largest rate of a slow actuator"),
     Size("FAIL_PERIOD", 1.0, 1e-3, 1e4, "s", "period of an intermittent failure, of a slow solution's updates"),
     Size("FAIL_DUTY", 0.5, 0.0, 1.0, "-", "healthy share of that period"),
@@ -95,6 +102,20 @@ LINK_SIZES = (
 """The columns of ``channel.Channel`` except ``blocked``, in their order."""
 
 SIZES = (*AIRFRAME_SIZES, *LINK_SIZES)
+
+
+def parameter_of(keyword: str) -> str:
+    """The parameter that a size is called by its keyword, or by its MAVLink name in small letters.
+
+    Raises
+    ------
+    LookupError
+        If there is no such size; the text names those that there are.
+    """
+    for size in SIZES:
+        if keyword in (size.keyword, size.name.removeprefix("FAIL_").lower()):
+            return size.name
+    raise LookupError(f"{keyword}: no such size; there are {', '.join(size.keyword for size in SIZES)}")
 
 
 @dataclass(frozen=True)

@@ -131,11 +131,11 @@ def fault(
     """Make an actuator, or the navigation solution, of a UAV fail."""
     sizes: dict[str, float] = {}
     if kind in ("wrong", "intermittent") and what not in ("position", "attitude"):
-        sizes |= {"eff": 1.0 if effectiveness is None else effectiveness, "bias": bias or 0.0}
+        sizes |= {"effectiveness": 1.0 if effectiveness is None else effectiveness, "bias": bias or 0.0}
         if effectiveness is None and bias is None:
             fail(f"fault {what}: say how large it is: --effectiveness, --bias")
     if kind == "wrong" and what not in ("position", "attitude"):
-        sizes |= {"eff_rate": onset or 0.0, "bias_rate": onset or 0.0}
+        sizes |= {"effectiveness_onset": onset or 0.0, "bias_onset": onset or 0.0}
     sizes |= {name: value for name, value in (("slew", slew), ("period", period), ("duty", duty)) if value is not None}
     for setting in size or []:
         name, _, text = setting.partition("=")

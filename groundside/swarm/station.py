@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from ftcc.groundside.swarm.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
-from ftcc.link.failures import KINDS, UNITS
+from ftcc.link.failures import KINDS, UNITS, parameter_of
 from ftcc.link.flight_modes import code_of, mode_called
 from ftcc.link.mavlink import AUTOPILOT, dialect
 
@@ -104,7 +104,7 @@ class Station(Conversation):
             "attitude" of the navigation solution.
         kind : "wrong", "off", "stuck", "slow", "intermittent" or "ok".
         at : simulated time, s; None: at once.
-        sizes : parameters by their names without FAIL_, in small letters, such as ``eff=0.6, bias=0.2``.
+        sizes : such as ``effectiveness=0.6, bias=0.2``, see ``ftcc.link.failures.SIZES``.
 
         Returns
         -------
@@ -135,10 +135,14 @@ class Station(Conversation):
         if unit not in UNITS or kind not in KINDS:
             raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
         timed = _At(self, uav, at)
-        for name, value in sizes.items():
-            as_float32(f"FAIL_{name.upper()}", value)
-        for name, value in sizes.items():
-            self.set(uav, f"FAIL_{name.upper()}", value)
+        try:
+            parameters = {parameter_of(name): value for name, value in sizes.items()}
+        except LookupError as error:
+            raise StationError(str(error)) from None
+        for name, value in parameters.items():
+            as_float32(name, value)
+        for name, value in parameters.items():
+            self.set(uav, name, value)
         with timed:
             ack = self.command(uav, dialect.MAV_CMD_INJECT_FAILURE, UNITS[unit].code, KINDS[kind], instance)
         return float(ack.result_param2) / 1e3

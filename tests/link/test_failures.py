@@ -16,6 +16,7 @@ from ftcc.link.failures import (
     UNITS,
     failure_messages,
     meaning_of,
+    parameter_of,
     parts_of,
     read_failure,
 )
@@ -29,6 +30,7 @@ def test_every_entry_is_found_by_the_codes_of_mavlink():
 
 def test_names_of_sizes_fit_a_parameter_and_defaults_lie_in_their_range():
     for size in SIZES:
+        assert parameter_of(size.keyword) == parameter_of(size.name.removeprefix("FAIL_").lower()) == size.name
         assert len(size.name) <= 16
         assert size.low <= size.default <= size.high
 
@@ -89,3 +91,8 @@ def test_an_aircraft_has_the_parts_that_it_is_steered_by(actuators, servos):
     assert parts_of(UNITS["servo"], actuators) == servos
     assert parts_of(UNITS["motor"], actuators) == ({1: "thrust"} if "thrust" in actuators else {})
     assert parts_of(UNITS["gps"], actuators) == {}
+
+
+def test_a_size_that_does_not_exist_is_refused_with_those_that_do():
+    with pytest.raises(LookupError, match=r"efficiency: no such size; there are effectiveness, bias, "):
+        parameter_of("efficiency")

@@ -51,7 +51,10 @@ def test_the_same_failures_planned_and_commanded_are_the_same_flight_bit_for_bit
     ]
     flight = held(fly, "--duration", "6", "--set", "faults=[]")
     with Station() as station:
-        assert station.fault(1, "elevator", at=2.0, eff=0.7, bias=0.2, eff_rate=2.0, bias_rate=2.0) == 2.0
+        assert (
+            station.fault(1, "elevator", at=2.0, effectiveness=0.7, bias=0.2, effectiveness_onset=2.0, bias_onset=2.0)
+            == 2.0
+        )
         station.fault(2, "elevator", kind="stuck", at=3.0)
         station.repair(2, "elevator", at=3.5)
         station.fault(3, "position", kind="off", at=4.0)
