@@ -14,7 +14,7 @@ from functools import partial
 from types import ModuleType
 
 from ftcc.airside.autopilots import tick_of, told
-from ftcc.airside.ground import GroundLink, Seat
+from ftcc.airside.gcs import GcsLink, Seat
 from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE, AutopilotGroup, build_group, flight_of
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
@@ -97,7 +97,7 @@ class Crew:
         self.group = self.group._replace(mail=self.neighbourhood.mail)
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
-        self.ground = [GroundLink(self.seat(i)) for i in range(len(specs))]
+        self.ground = [GcsLink(self.seat(i)) for i in range(len(specs))]
         for link in self.ground:
             for socket in link.sockets:
                 self.waiter.add(socket, partial(link.listen, socket))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ftcc.airside.ground import COMMANDS, MESSAGES
+from ftcc.airside.gcs import COMMANDS, MESSAGES
 from ftcc.link.mavlink import dialect
 
 PAGE = Path(__file__).parents[1] / "docs" / "ground-stations.md"

@@ -94,7 +94,7 @@ def commands() -> None:
     """List the MAVLink commands and messages to a UAV, and what it does about each."""
     from rich.table import Table
 
-    from ftcc.airside.ground import COMMANDS, MESSAGES
+    from ftcc.airside.gcs import COMMANDS, MESSAGES
     from ftcc.link.mavlink import dialect
 
     table = Table("MAV_CMD", "command", "what it does here", box=None)

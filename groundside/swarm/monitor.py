@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ftcc.airside.ground import LINK_FIELDS
+from ftcc.airside.gcs import LINK_FIELDS
 from ftcc.groundside.dashboard import Event, LinkState, Snapshot, UavState
 from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
 from ftcc.link.flight_modes import NAMES as MODES

@@ -14,7 +14,7 @@ from ftcc.link import signing
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.signing import Signing, read_key
-from tests.airside.ground.in_flight import M, flying, said
+from tests.airside.gcs.in_flight import M, flying, said
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import itertools
 
 import pytest
 
-from ftcc.airside.ground import schedule as schedules
-from ftcc.airside.ground.schedule import Schedule
+from ftcc.airside.gcs import schedule as schedules
+from ftcc.airside.gcs.schedule import Schedule
 
 TICK_US = 10_000
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside.swarm.conversation import RefusedError, StationError
-from tests.airside.ground.in_flight import LEVEL, M, said
+from tests.airside.gcs.in_flight import LEVEL, M, said
 
 
 @pytest.mark.parametrize(

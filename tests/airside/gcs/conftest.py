@@ -9,7 +9,7 @@ import pytest
 
 from ftcc.groundside.swarm.station import Station
 from tests.airside.autopilot_bench import Bench
-from tests.airside.ground.in_flight import flying
+from tests.airside.gcs.in_flight import flying
 
 
 @pytest.fixture

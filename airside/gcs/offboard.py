@@ -7,15 +7,15 @@ import re
 import time
 from typing import TYPE_CHECKING, Any
 
-from ftcc.airside.ground.answers import ACCEPTED
-from ftcc.airside.ground.modes import set_mode
-from ftcc.airside.ground.motion import lead, read_target
+from ftcc.airside.gcs.answers import ACCEPTED
+from ftcc.airside.gcs.flight_modes import set_mode
+from ftcc.airside.gcs.motion import lead, read_target
 from ftcc.airside.references import of_plant
 from ftcc.link.flight_modes import HOLD, OFFBOARD
 from ftcc.link.mavlink import dialect
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
+    from ftcc.airside.gcs.gcs_link import GcsLink
 
 __all__ = ["Offboard"]
 
@@ -37,7 +37,7 @@ class Offboard:
     COM_OF_LOSS_T says, in simulated time, offboard becomes hold: a swarm that is held loses nothing.
     """
 
-    def __init__(self, link: GroundLink) -> None:
+    def __init__(self, link: GcsLink) -> None:
         self._link = link
         self._references = of_plant(link.seat.scheme.plant)
         self._last = -math.inf

@@ -6,23 +6,23 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ftcc.airside.ground.answers import ACCEPTED, DENIED, UNSUPPORTED, Answer, Request, whole
-from ftcc.airside.ground.modes import set_mode
-from ftcc.airside.ground.motion import change_altitude, change_speed, reposition
-from ftcc.airside.ground.schedule import SLOWEST
-from ftcc.airside.ground.streams import requested
+from ftcc.airside.gcs.answers import ACCEPTED, DENIED, UNSUPPORTED, Answer, Request, whole
+from ftcc.airside.gcs.flight_modes import set_mode
+from ftcc.airside.gcs.motion import change_altitude, change_speed, reposition
+from ftcc.airside.gcs.schedule import SLOWEST
+from ftcc.airside.gcs.streams import requested
 from ftcc.link.flight_modes import HOLD, MISSION, mode_of
 from ftcc.link.mavlink import dialect
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
+    from ftcc.airside.gcs.gcs_link import GcsLink
 
 __all__ = ["COMMANDS", "Command"]
 
 _M = dialect
 
 
-def _set_message_interval(link: GroundLink, request: Request) -> Answer:
+def _set_message_interval(link: GcsLink, request: Request) -> Answer:
     message, interval = request.parameters[0], request.parameters[1]
     places = link.streams_of(message)
     if not places:
@@ -35,7 +35,7 @@ def _set_message_interval(link: GroundLink, request: Request) -> Answer:
     return Answer(ACCEPTED)
 
 
-def _get_message_interval(link: GroundLink, request: Request) -> Answer:
+def _get_message_interval(link: GcsLink, request: Request) -> Answer:
     message = request.parameters[0]
     places = link.streams_of(message)
     if math.isnan(message) or not 0 <= message < 2**16:
@@ -46,7 +46,7 @@ def _get_message_interval(link: GroundLink, request: Request) -> Answer:
     return Answer(ACCEPTED)
 
 
-def _request_message(link: GroundLink, request: Request) -> Answer:
+def _request_message(link: GcsLink, request: Request) -> Answer:
     number = request.parameters[0]
     messages = requested(link.seat, int(number)) if math.isfinite(number) else []
     if not messages:
@@ -55,37 +55,37 @@ def _request_message(link: GroundLink, request: Request) -> Answer:
     return Answer(ACCEPTED)
 
 
-def _request_this(message: int) -> Callable[[GroundLink, Request], Answer]:
-    def handle(link: GroundLink, request: Request) -> Answer:
+def _request_this(message: int) -> Callable[[GcsLink, Request], Answer]:
+    def handle(link: GcsLink, request: Request) -> Answer:
         return _request_message(link, request._replace(parameters=(float(message),) + (math.nan,) * 6))
 
     return handle
 
 
-def _do_set_mode(link: GroundLink, request: Request) -> Answer:
+def _do_set_mode(link: GcsLink, request: Request) -> Answer:
     mode = mode_of(request.parameters[1], request.parameters[2])
     if mode is None:
         return Answer(DENIED, "modes: mission (4 4), hold (4 3), offboard (6)")
     return set_mode(link, mode)
 
 
-def _pause_or_continue(link: GroundLink, request: Request) -> Answer:
+def _pause_or_continue(link: GcsLink, request: Request) -> Answer:
     if request.parameters[0] not in (0.0, 1.0):
         return Answer(DENIED, "0 = hold, 1 = go on")
     return set_mode(link, MISSION if request.parameters[0] else HOLD)
 
 
-def _arm(link: GroundLink, request: Request) -> Answer:
+def _arm(link: GcsLink, request: Request) -> Answer:
     if request.parameters[0] == 1.0:
         return Answer(ACCEPTED)
     return Answer(DENIED, "in the air: it stays armed" if request.parameters[0] == 0.0 else "1 = arm, 0 = disarm")
 
 
-def _so_it_is(link: GroundLink, request: Request) -> Answer:
+def _so_it_is(link: GcsLink, request: Request) -> Answer:
     return Answer(ACCEPTED)
 
 
-def _never(text: str) -> Callable[[GroundLink, Request], Answer]:
+def _never(text: str) -> Callable[[GcsLink, Request], Answer]:
     return lambda link, request: Answer(DENIED, text)
 
 

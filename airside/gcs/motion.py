@@ -6,16 +6,16 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
-from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, Answer, Request, degrees_of
-from ftcc.airside.ground.modes import set_mode
+from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, Answer, Request, degrees_of
+from ftcc.airside.gcs.flight_modes import set_mode
 from ftcc.airside.model import level_deflections
 from ftcc.airside.references.profiles import climb_of_step, command_from_ground
 from ftcc.link.flight_modes import HOLD
 from ftcc.link.mavlink import as_typed, dialect
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
-    from ftcc.airside.ground.seat import Seat
+    from ftcc.airside.gcs.gcs_link import GcsLink
+    from ftcc.airside.gcs.seat import Seat
 
 __all__ = ["change_altitude", "change_speed", "lead", "read_target", "reposition"]
 
@@ -34,7 +34,7 @@ def _above_home(seat: Seat, altitude: float, frame: float | None) -> tuple[float
     return math.nan, f"frame {frame:g}: 0, 5 (above sea) or 3, 6 (above home)"
 
 
-def lead(link: GroundLink, altitude: float | None, speed: float | None) -> Answer:
+def lead(link: GcsLink, altitude: float | None, speed: float | None) -> Answer:
     """Give a leader another altitude (m, z) or speed (m/s), at FTCC_AT."""
     seat = link.seat
     if not seat.leader or seat.spec.profile is None:
@@ -99,7 +99,7 @@ def _cannot_be_followed(seat: Seat, altitude: float | None, speed: float | None)
     return fatal[0] if fatal else ""
 
 
-def change_altitude(link: GroundLink, request: Request) -> Answer:
+def change_altitude(link: GcsLink, request: Request) -> Answer:
     """DO_CHANGE_ALTITUDE; its frame is its second parameter, also in a COMMAND_INT."""
     altitude, frame = request.parameters[:2]
     if not math.isfinite(altitude):
@@ -108,7 +108,7 @@ def change_altitude(link: GroundLink, request: Request) -> Answer:
     return Answer(DENIED, why) if why else lead(link, altitude, None)
 
 
-def change_speed(link: GroundLink, request: Request) -> Answer:
+def change_speed(link: GcsLink, request: Request) -> Answer:
     """DO_CHANGE_SPEED."""
     kind, speed = request.parameters[0], as_typed(request.parameters[1])
     if kind not in (0.0, 1.0):
@@ -118,7 +118,7 @@ def change_speed(link: GroundLink, request: Request) -> Answer:
     return lead(link, None, speed)
 
 
-def reposition(link: GroundLink, request: Request) -> Answer:
+def reposition(link: GcsLink, request: Request) -> Answer:
     """DO_REPOSITION, the way in which QGroundControl changes an altitude, and, where nothing is given, pauses."""
     speed, flags, radius, yaw, latitude, longitude, altitude = request.parameters
     if any(map(math.isinf, request.parameters)):

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.ground.answers import whole
-from ftcc.airside.ground.seat import Seat
+from ftcc.airside.gcs.answers import whole
+from ftcc.airside.gcs.seat import Seat
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
 from ftcc.link.flight_modes import custom_mode

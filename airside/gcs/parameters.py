@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.ground.schedule import SLOWEST
-from ftcc.airside.ground.seat import Seat
-from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.gcs.schedule import SLOWEST
+from ftcc.airside.gcs.seat import Seat
+from ftcc.airside.gcs.streams import STREAMS
 from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
 from ftcc.link.channel import Channel

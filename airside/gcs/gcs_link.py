@@ -10,21 +10,21 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ftcc.airside.ground.answers import Answer, Request, whole
-from ftcc.airside.ground.commands import COMMANDS
-from ftcc.airside.ground.failures import Failures
-from ftcc.airside.ground.offboard import Offboard
-from ftcc.airside.ground.parameters import Parameters
-from ftcc.airside.ground.requests import MESSAGES
-from ftcc.airside.ground.schedule import Schedule
-from ftcc.airside.ground.seat import Seat
-from ftcc.airside.ground.signatures import Signatures
-from ftcc.airside.ground.streams import LOGGED, STREAMS, heartbeat, rates_of
+from ftcc.airside.gcs.answers import Answer, Request, whole
+from ftcc.airside.gcs.commands import COMMANDS
+from ftcc.airside.gcs.failures import Failures
+from ftcc.airside.gcs.offboard import Offboard
+from ftcc.airside.gcs.parameters import Parameters
+from ftcc.airside.gcs.requests import MESSAGES
+from ftcc.airside.gcs.schedule import Schedule
+from ftcc.airside.gcs.seat import Seat
+from ftcc.airside.gcs.signatures import Signatures
+from ftcc.airside.gcs.streams import LOGGED, STREAMS, heartbeat, rates_of
 from ftcc.link.gate import LauncherGoneError
 from ftcc.link.gcs_sockets import GcsSocket, Peer
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, dialect, status_text
 
-__all__ = ["GroundLink"]
+__all__ = ["GcsLink"]
 
 _M = dialect
 _HEARTBEAT = 1.0
@@ -38,7 +38,7 @@ _TURNED_AWAY = 10.0
 _Key = tuple[int, int, int, str]
 
 
-class GroundLink:
+class GcsLink:
     """All that one autopilot has to do with the ground."""
 
     def __init__(self, seat: Seat) -> None:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ftcc.airside.ground.commands import COMMANDS
-from ftcc.airside.ground.requests import MESSAGES
-from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.gcs.commands import COMMANDS
+from ftcc.airside.gcs.requests import MESSAGES
+from ftcc.airside.gcs.streams import STREAMS
 from ftcc.airside.schemes import find
 from ftcc.groundside.swarm.conversation import NoAnswerError, RefusedError
 from ftcc.groundside.swarm.registry import Card, Entry
@@ -24,7 +24,7 @@ from ftcc.link.failures import failure_answer, read_failure
 from ftcc.link.flight_modes import HOLD, MISSION
 from ftcc.link.mavlink import LOOPBACK
 from tests.airside.autopilot_bench import Bench
-from tests.airside.ground.in_flight import LEVEL, M, ask, said
+from tests.airside.gcs.in_flight import LEVEL, M, ask, said
 from tests.pymavlink_wire import state_messages
 
 # Questions.

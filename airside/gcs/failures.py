@@ -8,8 +8,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
-from ftcc.airside.ground.seat import Seat
+from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
+from ftcc.airside.gcs.seat import Seat
 from ftcc.airside.link_events import OWN_RADIO
 from ftcc.airside.link_events import inject as inject_link_event
 from ftcc.airside.model import Model, level_deflections
@@ -21,7 +21,7 @@ from ftcc.link.mavlink import dialect
 from ftcc.link.text import as_seconds
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
+    from ftcc.airside.gcs.gcs_link import GcsLink
 
 __all__ = ["Failures"]
 
@@ -35,7 +35,7 @@ _FAILED = dialect.MAV_RESULT_FAILED
 class Failures:
     """The failures of one UAV, on their way."""
 
-    def __init__(self, link: GroundLink) -> None:
+    def __init__(self, link: GcsLink) -> None:
         self._link = link
         self._seat: Seat = link.seat
         self._waiting: tuple[Request, Meaning, int, float] | None = None

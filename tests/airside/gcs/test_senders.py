@@ -11,7 +11,7 @@ import pytest
 
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
-from tests.airside.ground.in_flight import LEVEL, M, ask, said
+from tests.airside.gcs.in_flight import LEVEL, M, ask, said
 
 ARM = M.MAVLink_command_long_message(1, 1, M.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 

@@ -10,7 +10,7 @@ import pytest
 
 from ftcc.groundside.swarm.conversation import RefusedError
 from ftcc.link.mavlink import LOOPBACK
-from tests.airside.ground.in_flight import LEVEL, M, ask, flying
+from tests.airside.gcs.in_flight import LEVEL, M, ask, flying
 
 HOME = 500.0
 NOT_GIVEN = 2**31 - 1

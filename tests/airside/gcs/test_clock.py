@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftcc.airside.ground.requests import MESSAGES
-from ftcc.airside.ground.streams import STREAMS
+from ftcc.airside.gcs.requests import MESSAGES
+from ftcc.airside.gcs.streams import STREAMS
 from ftcc.link.codec import Codec
 from ftcc.link.flight_modes import HOLD, OFFBOARD
-from tests.airside.ground.in_flight import LEVEL, M, ask, flying, said
+from tests.airside.gcs.in_flight import LEVEL, M, ask, flying, said
 
 EPOCH = 1_700_000_000_000_000
 OFFBOARD_MODE = (129, 6, 0)

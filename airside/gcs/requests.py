@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ftcc.airside.ground.answers import ACCEPTED, read_request
-from ftcc.airside.ground.modes import set_mode
-from ftcc.airside.ground.parameters import RefusedError
+from ftcc.airside.gcs.answers import ACCEPTED, read_request
+from ftcc.airside.gcs.flight_modes import set_mode
+from ftcc.airside.gcs.parameters import RefusedError
 from ftcc.link.flight_modes import mode_of
 from ftcc.link.mavlink import dialect
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
+    from ftcc.airside.gcs.gcs_link import GcsLink
     from ftcc.link.gcs_sockets import Peer
 
 __all__ = ["MESSAGES", "Message"]
@@ -24,7 +24,7 @@ _FTP_ERRORS = {3: _FTP_END_OF_FILE, 4: _FTP_NOT_FOUND, 14: _FTP_NOT_FOUND, 15: _
 """By request: a folder is listed to its end, a file to be read is not found; all others are unknown."""
 
 
-def _parameter_list(link: GroundLink, peer: Peer, message: Any) -> None:
+def _parameter_list(link: GcsLink, peer: Peer, message: Any) -> None:
     peer.send(*(link.parameters.message(n) for n in range(len(link.parameters))))
 
 
@@ -38,7 +38,7 @@ def _not_there(peer: Peer, message: Any) -> None:
     )
 
 
-def _parameter_read(link: GroundLink, peer: Peer, message: Any) -> None:
+def _parameter_read(link: GcsLink, peer: Peer, message: Any) -> None:
     n = link.parameters.find(message.param_id, message.param_index)
     if n is None:
         _not_there(peer, message)
@@ -46,7 +46,7 @@ def _parameter_read(link: GroundLink, peer: Peer, message: Any) -> None:
         peer.send(link.parameters.message(n))
 
 
-def _parameter_set(link: GroundLink, peer: Peer, message: Any) -> None:
+def _parameter_set(link: GcsLink, peer: Peer, message: Any) -> None:
     """Answered with the value in force, whatever becomes of the one asked for."""
     n = link.parameters.find(message.param_id, -1)
     who = f"{message.get_srcSystem()}/{message.get_srcComponent()}"
@@ -72,12 +72,12 @@ def _parameter_set(link: GroundLink, peer: Peer, message: Any) -> None:
         peer.send(answer)
 
 
-def _command(link: GroundLink, peer: Peer, message: Any) -> None:
+def _command(link: GcsLink, peer: Peer, message: Any) -> None:
     confirmation = getattr(message, "confirmation", 0)
     link.obey(read_request(message, peer), repeated=confirmation > 0)
 
 
-def _set_mode(link: GroundLink, peer: Peer, message: Any) -> None:
+def _set_mode(link: GcsLink, peer: Peer, message: Any) -> None:
     """SET_MODE, which nothing answers but the next HEARTBEAT."""
     mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
     if mode is None:
@@ -90,39 +90,39 @@ def _set_mode(link: GroundLink, peer: Peer, message: Any) -> None:
         link.seat.note(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
 
 
-def _mission_list(link: GroundLink, peer: Peer, message: Any) -> None:
+def _mission_list(link: GcsLink, peer: Peer, message: Any) -> None:
     kind = message.mission_type
     peer.send(_M.MAVLink_mission_count_message(message.get_srcSystem(), message.get_srcComponent(), 0, kind))
 
 
-def _mission_answer(result: int) -> Callable[[GroundLink, Peer, Any], None]:
-    def handle(link: GroundLink, peer: Peer, message: Any) -> None:
+def _mission_answer(result: int) -> Callable[[GcsLink, Peer, Any], None]:
+    def handle(link: GcsLink, peer: Peer, message: Any) -> None:
         kind = getattr(message, "mission_type", _M.MAV_MISSION_TYPE_MISSION)
         peer.send(_M.MAVLink_mission_ack_message(message.get_srcSystem(), message.get_srcComponent(), result, kind))
 
     return handle
 
 
-def _mission_upload(link: GroundLink, peer: Peer, message: Any) -> None:
+def _mission_upload(link: GcsLink, peer: Peer, message: Any) -> None:
     """An empty mission is what we have; any other is refused: the scenario is the mission."""
     result = _M.MAV_MISSION_ACCEPTED if message.count == 0 else _M.MAV_MISSION_UNSUPPORTED
     _mission_answer(result)(link, peer, message)
 
 
-def _timesync(link: GroundLink, peer: Peer, message: Any) -> None:
+def _timesync(link: GcsLink, peer: Peer, message: Any) -> None:
     """Answered with the simulated time of the last tick, by which all other messages are stamped, too."""
     if message.tc1 == 0:
         # An answer of 0 would be a question.
         peer.send(_M.MAVLink_timesync_message(max(1, link.seat.now_us * 1000), message.ts1))
 
 
-def _ping(link: GroundLink, peer: Peer, message: Any) -> None:
+def _ping(link: GcsLink, peer: Peer, message: Any) -> None:
     if message.target_system == 0:
         sender = message.get_srcSystem(), message.get_srcComponent()
         peer.send(_M.MAVLink_ping_message(message.time_usec, message.seq, *sender))
 
 
-def _files(link: GroundLink, peer: Peer, message: Any) -> None:
+def _files(link: GcsLink, peer: Peer, message: Any) -> None:
     """MAVLink FTP of a vehicle without files; answers to somebody else's questions are left alone."""
     payload = list(message.payload)
     if payload[3] >= 128:
@@ -135,11 +135,11 @@ def _files(link: GroundLink, peer: Peer, message: Any) -> None:
     peer.send(_M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer))
 
 
-def _logs(link: GroundLink, peer: Peer, message: Any) -> None:
+def _logs(link: GcsLink, peer: Peer, message: Any) -> None:
     peer.send(_M.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
 
-def _target(link: GroundLink, peer: Peer, message: Any) -> None:
+def _target(link: GcsLink, peer: Peer, message: Any) -> None:
     link.offboard.take(message)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from ftcc.airside.ground.seat import Seat
+from ftcc.airside.gcs.seat import Seat
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import AUTOPILOT
 from ftcc.link.signing import Refusal, Signing, read_key, stamps_file

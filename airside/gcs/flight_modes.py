@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ftcc.airside.ground.answers import ACCEPTED, BUSY, DENIED, Answer
+from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, Answer
 from ftcc.airside.references.profiles import release_from_ground
 from ftcc.link.flight_modes import MISSION, NAMES, OFFBOARD
 
 if TYPE_CHECKING:
-    from ftcc.airside.ground.link import GroundLink
+    from ftcc.airside.gcs.gcs_link import GcsLink
 
 __all__ = ["set_mode"]
 
 
-def set_mode(link: GroundLink, mode: int) -> Answer:
+def set_mode(link: GcsLink, mode: int) -> Answer:
     """Change the mode; to set the present one again does nothing."""
     seat = link.seat
     if mode == seat.autopilots.mode[seat.i]:

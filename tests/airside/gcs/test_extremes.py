@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ftcc.airside.ground.commands import COMMANDS
-from ftcc.airside.ground.requests import MESSAGES
+from ftcc.airside.gcs.commands import COMMANDS
+from ftcc.airside.gcs.requests import MESSAGES
 from ftcc.groundside.swarm.conversation import RefusedError
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import LOOPBACK
-from tests.airside.ground.in_flight import LEVEL, M, flying, said
+from tests.airside.gcs.in_flight import LEVEL, M, flying, said
 
 EXTREMES = (
     0.0,
