@@ -14,7 +14,7 @@ from functools import partial
 from types import ModuleType
 
 from ftcc.airside.autopilots import tick_of, told
-from ftcc.airside.gcs import GcsLink, Seat
+from ftcc.airside.gcs import AutopilotView, GcsLink
 from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE, AutopilotGroup, build_group, flight_of
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
@@ -28,7 +28,7 @@ from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, MAIL, WORK
 from ftcc.link.wire import connect, keep_sent, send_again, split
 
-__all__ = ["Crew", "columns", "load_compiled", "run"]
+__all__ = ["AutopilotProcess", "columns", "load_compiled", "main"]
 
 _ATTENTION = 0.02
 """Wall time between two looks at what the ground waits for, s."""
@@ -42,20 +42,20 @@ def columns(scheme: str) -> tuple[Column, ...]:
     return (Column("t", "s", "simulated time"), Column("uav", "-", "id"), *signals)
 
 
-def run(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
+def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     """Fly the autopilots of this process from the launcher's go to its release."""
-    crew = Crew(specs, setting, gate)
+    process = AutopilotProcess(specs, setting, gate)
     refusal = tick_of(specs[0].scheme).REFUSAL
     try:
         if refusal and specs[0].uav == min(setting.ports):
             # One process speaks for all.
             gate.tell(Said("warning", refusal))
-        crew.meet()
+        process.wait_for_neighbours()
         gate.tell(Ready())
         gate.wait_until_go()
-        crew.fly()
+        process.fly()
     finally:
-        crew.close()
+        process.close()
 
 
 def load_compiled(group: AutopilotGroup, timing: Timing, flight: ModuleType) -> None:
@@ -67,7 +67,7 @@ def load_compiled(group: AutopilotGroup, timing: Timing, flight: ModuleType) -> 
     group.alive[:] = alive
 
 
-class Crew:
+class AutopilotProcess:
     """The autopilots of a process."""
 
     def __init__(self, specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
@@ -97,8 +97,8 @@ class Crew:
         self.group = self.group._replace(mail=self.neighbourhood.mail)
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
-        self.ground = [GcsLink(self.seat(i)) for i in range(len(specs))]
-        for link in self.ground:
+        self.gcs_links = [GcsLink(self.view(i)) for i in range(len(specs))]
+        for link in self.gcs_links:
             for socket in link.sockets:
                 self.waiter.add(socket, partial(link.listen, socket))
         # In real time nobody waits for records: what has come is taken before the next tick.
@@ -111,24 +111,24 @@ class Crew:
         """Tell that something cannot be recorded."""
         self.gate.tell(Said("error", text))
 
-    def seat(self, i: int) -> Seat:
-        """What the ground may see and touch of autopilot ``i``."""
-        return Seat(
+    def view(self, i: int) -> AutopilotView:
+        """What the side towards the ground sees of autopilot ``i``."""
+        return AutopilotView(
             spec=self.specs[i],
             i=i,
             setting=self.setting,
             scheme=find(self.specs[i].scheme),
             autopilots=self.group.autopilots,
             inbox=self.group.inbox,
-            events=self.group.events,
-            message=self.group.states[i],
+            link_events=self.group.events,
+            state=self.group.states[i],
             controls=self.group.controls[i],
             vehicle=self.vehicles[i],
-            tell=self.gate.tell,
+            send_to_launcher=self.gate.tell,
             done=self.group.done[i : i + 1],
         )
 
-    def meet(self) -> None:
+    def wait_for_neighbours(self) -> None:
         """Wait until all who hear this process's UAVs have subscribed."""
         self.stall.progress()
         while not self.neighbourhood.ready and not self.gate.stopping:
@@ -178,10 +178,10 @@ class Crew:
     def report(self) -> None:
         """Tell the ground what is due, and when something will be due next."""
         group = self.group
-        for i, link in enumerate(self.ground):
+        for i, link in enumerate(self.gcs_links):
             if group.active[i]:
                 link.report(int(group.done[i]) * self.timing.period_us)
-        flying = [link for link in self.ground if link.seat.alive]
+        flying = [link for link in self.gcs_links if link.view.alive]
         group.report_us[0] = min((link.next_us for link in flying), default=0)
         group.report_wall[0] = min((link.next_wall for link in flying), default=0.0)
 
@@ -194,8 +194,8 @@ class Crew:
         if self.group.unsendable[0]:
             raise ValueError(f"UAV {self.names}: a value that was to be sent is not finite")
         self.group.given_up[0] = 0
-        for i, link in enumerate(self.ground):
-            if not self.group.alive[i] and link.seat.alive:
+        for i, link in enumerate(self.gcs_links):
+            if not self.group.alive[i] and link.view.alive:
                 keep_sent(self.group.wire, i, self.vehicles[i].pack(ending_message()))
                 send_again(self.group.wire, i)
                 link.end()
@@ -211,7 +211,7 @@ class Crew:
         now = time.monotonic()
         if now >= self.group.attention[0]:
             self.group.attention[0] = now + _ATTENTION
-            for link in self.ground:
+            for link in self.gcs_links:
                 link.attend()
             self.complain()
 
@@ -240,9 +240,9 @@ class Crew:
                     self.flight.take(self.group, self.timing, i)
             elif ends(message):
                 self.group.alive[i] = 0
-                self.ground[i].end()
+                self.gcs_links[i].end()
             elif message.get_type() == "COMMAND_ACK":
-                self.ground[i].vehicle_answered(message)
+                self.gcs_links[i].take_vehicle_answer(message)
                 self.report_soon()
 
     @property
@@ -253,11 +253,11 @@ class Crew:
         """Nobody must wait for this process; what it has recorded is written; it goes when all have ended."""
         self.group.alive[:] = 0
         self.neighbourhood.end()
-        for link in self.ground:
+        for link in self.gcs_links:
             link.end()
         self.recorder.close()
         self.link_recorder.close()
-        for spec, link in zip(self.specs, self.ground, strict=True):
+        for spec, link in zip(self.specs, self.gcs_links, strict=True):
             dropped = {reason: count for reason, count in link.dropped().items() if count}
             if dropped:
                 listed = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items())
@@ -270,7 +270,7 @@ class Crew:
         """Free the ports; leave the mesh."""
         for vehicle in self.vehicles:
             vehicle.close()
-        for link in self.ground:
+        for link in self.gcs_links:
             link.close()
         self.neighbourhood.close()
         self.waiter.close()

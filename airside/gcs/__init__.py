@@ -1,11 +1,11 @@
-"""What an autopilot is to the ground: a MAVLink vehicle that tells, answers and obeys."""
+"""What an autopilot is to the ground: a MAVLink vehicle that sends telemetry, answers and obeys."""
 
 from __future__ import annotations
 
+from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.commands import COMMANDS
 from ftcc.airside.gcs.gcs_link import GcsLink
 from ftcc.airside.gcs.requests import MESSAGES
-from ftcc.airside.gcs.seat import Home, Seat
 from ftcc.airside.gcs.streams import LINK_FIELDS
 
-__all__ = ["COMMANDS", "LINK_FIELDS", "MESSAGES", "GcsLink", "Home", "Seat"]
+__all__ = ["COMMANDS", "LINK_FIELDS", "MESSAGES", "AutopilotView", "GcsLink"]

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from ftcc.link.gcs_sockets import Peer
 from ftcc.link.mavlink import dialect
-
-if TYPE_CHECKING:
-    from ftcc.link.gcs_sockets import Peer
 
 __all__ = ["ACCEPTED", "BUSY", "DENIED", "UNSUPPORTED", "Answer", "Request", "degrees_of", "read_request", "whole"]
 
@@ -41,7 +39,7 @@ class Request(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What COMMAND_ACK says."""
+    """What becomes of a command: COMMAND_ACK, and what goes with it."""
 
     result: int
     text: str = ""
@@ -50,6 +48,8 @@ class Answer(NamedTuple):
     """What was done, for the log; empty: nothing worth logging."""
     detail: int = 0
     """result_param2."""
+    messages: tuple[Any, ...] = ()
+    """What is sent behind the COMMAND_ACK."""
 
 
 def degrees_of(value: int) -> float:

@@ -1,15 +1,16 @@
-"""Failures that the ground asks for: checked, passed on to the vehicle or the radio links, told when they act."""
+"""Failures that the ground asks for: checked, passed on to the vehicle or the radio links, reported when they act."""
 
 from __future__ import annotations
 
 import heapq
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
-from ftcc.airside.gcs.seat import Seat
+from ftcc.airside.gcs.autopilot_view import AutopilotView
+from ftcc.airside.gcs.outbox import Outbox
 from ftcc.airside.link_events import OWN_RADIO
 from ftcc.airside.link_events import inject as inject_link_event
 from ftcc.airside.model import Model, level_deflections
@@ -18,14 +19,10 @@ from ftcc.link.channel import Channel
 from ftcc.link.compiled import fields
 from ftcc.link.failures import AIRFRAME_SIZES, EVERY, LINK_SIZES, Meaning, failure_messages, meaning_of, parts_of
 from ftcc.link.mavlink import dialect
-from ftcc.link.text import as_seconds
-
-if TYPE_CHECKING:
-    from ftcc.airside.gcs.gcs_link import GcsLink
 
 __all__ = ["Failures"]
 
-_PATIENCE = 0.2
+_VEHICLE_TIMEOUT = 0.2
 """Wall time that a vehicle has to answer, s."""
 _NEVER = 2**62
 """Beyond every simulated time, us."""
@@ -35,12 +32,12 @@ _FAILED = dialect.MAV_RESULT_FAILED
 class Failures:
     """The failures of one UAV, on their way."""
 
-    def __init__(self, link: GcsLink) -> None:
-        self._link = link
-        self._seat: Seat = link.seat
+    def __init__(self, view: AutopilotView, outbox: Outbox) -> None:
+        self._view = view
+        self._outbox = outbox
         self._waiting: tuple[Request, Meaning, int, float] | None = None
         """What the vehicle was asked: request, meaning, instance, and until when it may answer (wall, s)."""
-        self._names = in_slots(self._seat.scheme.commands)
+        self._names = in_slots(self._view.scheme.commands)
         """The actuators by slot, as this kind of aircraft has them."""
         self._armed: list[tuple[int, int, str, str, str]] = []
         """What will act: time us, number, severity, text, who."""
@@ -51,71 +48,56 @@ class Failures:
         """Whether the vehicle still owes an answer."""
         return self._waiting is not None
 
-    def time(self) -> tuple[int, str]:
-        """When what is asked now acts, us, or why it cannot."""
-        at_us = self._seat.at_ms * 1000
-        if at_us == 0:
-            return self._seat.next_us, ""
-        if at_us < self._seat.next_us:
-            return 0, f"FTCC_AT {self._seat.at_ms} ms is past"
-        if at_us > self._seat.setting.timing.ticks * self._seat.setting.timing.period_us:
-            return 0, f"FTCC_AT {self._seat.at_ms} ms: after the end"
-        return at_us, ""
-
-    def later(self, at_us: int) -> str:
-        """ " at t = ..." where something does not act at once."""
-        return f" at t = {as_seconds(at_us)} s" if at_us > self._seat.next_us else ""
-
     def inject(self, request: Request) -> Answer | None:
         """Arm a failure; None: the answer comes when the vehicle has given its own."""
         meaning = meaning_of(*request.parameters[:3])
         if meaning is None:
             return Answer(UNSUPPORTED)
-        if not self._seat.failures_enabled:
+        if not self._view.failures_enabled:
             return Answer(DENIED, "SYS_FAILURE_EN is 0")
-        at_us, why = self.time()
+        at_us, why = self._view.acting_time()
         if why:
             return Answer(DENIED, why)
         instance = int(request.parameters[2])
         if not meaning.unit.on_board:
             return self._fail_link(request, meaning, instance, at_us)
-        if self._seat.leader:
+        if self._view.leader:
             return Answer(DENIED, "a leader is a reference point: it has no parts")
         missing = self._missing(meaning, instance)
         if missing:
             return Answer(UNSUPPORTED, missing)
         if self._waiting is not None:
             return Answer(BUSY, "the vehicle has not answered the last one")
-        sizes = [self._seat.sizes[size.name] for size in AIRFRAME_SIZES]
-        asked = 0 if self._seat.at_ms == 0 else at_us
-        self._seat.vehicle.send(*failure_messages(self._seat.spec.uav, meaning, instance, asked, sizes))
-        self._waiting = (request, meaning, instance, time.monotonic() + _PATIENCE)
+        sizes = [self._view.failure_sizes[size.name] for size in AIRFRAME_SIZES]
+        asked = 0 if self._view.at_ms == 0 else at_us
+        self._view.vehicle.send(*failure_messages(self._view.spec.uav, meaning, instance, asked, sizes))
+        self._waiting = (request, meaning, instance, time.monotonic() + _VEHICLE_TIMEOUT)
         return None
 
-    def vehicle_answered(self, message: Any) -> None:
+    def take_vehicle_answer(self, message: Any) -> None:
         """COMMAND_ACK of the vehicle; it names the simulated time at which the failure acts."""
         if self._waiting is None or message.command != dialect.MAV_CMD_INJECT_FAILURE:
             return
         request, meaning, instance, _ = self._waiting
         self._waiting = None
         if message.result != ACCEPTED:
-            self._link.answer(request, Answer(message.result, "refused by the vehicle"))
+            self._outbox.answer(request, Answer(message.result, "refused by the vehicle"))
             return
         at_us = message.result_param2 * 1000
         text = self._text(meaning, instance)
         self._arm(request, "info" if meaning.kind == "ok" else "warning", text, at_us)
         warning = self._leaves_no_trim(meaning, instance)
         if warning:
-            self._link.text(dialect.MAV_SEVERITY_WARNING, warning)
-            self._seat.note(warning, "warning")
-        self._link.answer(request, Answer(ACCEPTED, detail=message.result_param2))
+            self._outbox.send_text(dialect.MAV_SEVERITY_WARNING, warning)
+            self._view.log(warning, "warning")
+        self._outbox.answer(request, Answer(ACCEPTED, detail=message.result_param2))
 
-    def attend(self) -> None:
+    def check_timeout(self) -> None:
         """Answer for a vehicle that does not."""
         if self._waiting is not None and time.monotonic() > self._waiting[3]:
             request = self._waiting[0]
             self._waiting = None
-            self._link.answer(request, Answer(_FAILED, "the vehicle does not answer"))
+            self._outbox.answer(request, Answer(_FAILED, "the vehicle does not answer"))
 
     @property
     def armed(self) -> bool:
@@ -127,25 +109,25 @@ class Failures:
         """When the next of what has been armed acts, simulated us."""
         return self._armed[0][0] if self._armed else _NEVER
 
-    def tell_what_acts(self, now_us: int) -> None:
-        """Say of what has been armed that it acts, when its time has come."""
+    def report_acting(self, now_us: int) -> None:
+        """Report the failures that have been armed for now or before."""
         while self._armed and self._armed[0][0] <= now_us:
             at_us, _, severity, text, who = heapq.heappop(self._armed)
-            self._link.text(
+            self._outbox.send_text(
                 dialect.MAV_SEVERITY_WARNING if severity == "warning" else dialect.MAV_SEVERITY_NOTICE, text
             )
-            self._seat.note(text, severity, who, "acts", at_us)
+            self._view.log(text, severity, who, "acts", at_us)
 
     def _arm(self, request: Request, severity: str, text: str, at_us: int) -> None:
-        if at_us > self._seat.now_us + self._seat.setting.timing.period_us:
-            self._seat.note(f"{text}{self.later(at_us)}", "info", request.who, "armed")
+        if at_us > self._view.now_us + self._view.setting.timing.period_us:
+            self._view.log(f"{text}{self._view.if_later(at_us)}", "info", request.who, "armed")
         entry = (at_us, severity, text, request.who)
         if all((at, *rest) != entry for at, _, *rest in self._armed):
             self._count += 1
             heapq.heappush(self._armed, (at_us, self._count, severity, text, request.who))
 
     def _fail_link(self, request: Request, meaning: Meaning, instance: int, at_us: int) -> Answer:
-        spec = self._seat.spec
+        spec = self._view.spec
         senders = [neighbour.uav for neighbour in spec.neighbours]
         if instance != EVERY and instance not in senders:
             return Answer(DENIED, f"UAV {spec.uav} does not hear UAV {instance}")
@@ -157,7 +139,7 @@ class Failures:
         if own_radio:
             changes.append((OWN_RADIO, self._quality(meaning)))
         for edge, quality in changes:
-            if not inject_link_event(self._seat.events, at_us, self._seat.i, edge, quality):
+            if not inject_link_event(self._view.link_events, at_us, self._view.i, edge, quality):
                 return Answer(BUSY, "too many link failures are waiting")
         self._arm(request, "info" if meaning.kind == "ok" else "warning", self._text(meaning, instance), at_us)
         return Answer(ACCEPTED, detail=at_us // 1000)
@@ -165,10 +147,12 @@ class Failures:
     def _quality(self, meaning: Meaning) -> Channel:
         """What a failure of a link changes; nan: nothing."""
         if meaning.kind == "ok":
-            return self._seat.channel._replace(blocked=0.0)
+            return self._view.channel._replace(blocked=0.0)
         if meaning.kind == "off":
             return Channel._make([math.nan] * len(LINK_SIZES) + [1.0])
-        values = [self._seat.sizes[size.name] if size.name in meaning.sizes else math.nan for size in LINK_SIZES]
+        values = [
+            self._view.failure_sizes[size.name] if size.name in meaning.sizes else math.nan for size in LINK_SIZES
+        ]
         return Channel._make([*values, math.nan])
 
     def _text(self, meaning: Meaning, instance: int) -> str:
@@ -180,15 +164,15 @@ class Failures:
         if meaning.kind == "ok":
             return f"{what} {meaning.text}"
         sizes = ", ".join(
-            f"{name.removeprefix('FAIL_').lower()} {self._seat.sizes[name]:g}"
+            f"{name.removeprefix('FAIL_').lower()} {self._view.failure_sizes[name]:g}"
             for name in meaning.sizes
-            if self._seat.sizes[name] != 0.0 or name in ("FAIL_EFF", "FAIL_DUTY")
+            if self._view.failure_sizes[name] != 0.0 or name in ("FAIL_EFF", "FAIL_DUTY")
         )
         return f"{what} {meaning.kind}{': ' if sizes else ''}{sizes}"
 
     def _missing(self, meaning: Meaning, instance: int) -> str:
         """What the aircraft has, where it has nothing of what is to fail; else empty."""
-        has = [name for name in self._names if self._seat.spec.travel[SLOT[name]] > 0.0]
+        has = [name for name in self._names if self._view.spec.travel[SLOT[name]] > 0.0]
         parts = parts_of(meaning.unit, has)
         asked = meaning.unit.parts if instance == EVERY else meaning.unit.parts[instance - 1 : instance]
         if not asked or (parts if instance == EVERY else instance in parts):
@@ -204,15 +188,15 @@ class Failures:
         """A warning where a failed actuator can no longer hold level flight at the present speed; else empty."""
         if meaning.kind not in ("wrong", "off") or not meaning.unit.parts:
             return ""
-        own = fields(Own, self._seat.autopilots.own[self._seat.i])
-        model = fields(Model, self._seat.autopilots.model[self._seat.i])
-        effectiveness = 0.0 if meaning.kind == "off" else self._seat.sizes["FAIL_EFF"]
-        bias = 0.0 if meaning.kind == "off" else self._seat.sizes["FAIL_BIAS"]
+        own = fields(Own, self._view.autopilots.own[self._view.i])
+        model = fields(Model, self._view.autopilots.model[self._view.i])
+        effectiveness = 0.0 if meaning.kind == "off" else self._view.failure_sizes["FAIL_EFF"]
+        bias = 0.0 if meaning.kind == "off" else self._view.failure_sizes["FAIL_BIAS"]
         for name in meaning.unit.parts if instance == EVERY else (self._part(meaning, instance),):
-            if name not in self._seat.scheme.commands:
+            if name not in self._view.scheme.commands:
                 continue
             slot = ACTUATORS.index(name)
-            travel = float(self._seat.autopilots.travel[self._seat.i, slot])
+            travel = float(self._view.autopilots.travel[self._view.i, slot])
             needed = level_deflections(own.V, model).get(name, 0.0)
             if travel == 0.0 or abs(needed - bias) < effectiveness * travel or needed == bias:
                 continue

@@ -4,74 +4,68 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, Answer, Request, degrees_of
-from ftcc.airside.gcs.flight_modes import set_mode
+from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, Answer, degrees_of
+from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.model import level_deflections
 from ftcc.airside.references.profiles import climb_of_step, command_from_ground
 from ftcc.link.flight_modes import HOLD
 from ftcc.link.mavlink import as_typed, dialect
 
-if TYPE_CHECKING:
-    from ftcc.airside.gcs.gcs_link import GcsLink
-    from ftcc.airside.gcs.seat import Seat
-
-__all__ = ["change_altitude", "change_speed", "lead", "read_target", "reposition"]
+__all__ = ["altitude_above_home", "command_leader", "read_target"]
 
 _M = dialect
 _ABOVE_SEA = (_M.MAV_FRAME_GLOBAL, _M.MAV_FRAME_GLOBAL_INT)
 _ABOVE_HOME = (_M.MAV_FRAME_GLOBAL_RELATIVE_ALT, _M.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-_ONLY = "only altitude and speed can be changed"
 
 
-def _above_home(seat: Seat, altitude: float, frame: float | None) -> tuple[float, str]:
+def altitude_above_home(view: AutopilotView, altitude: float, frame: float | None) -> tuple[float, str]:
     """An altitude (m) above the origin, or why its frame means nothing here; without a frame it is above the sea."""
     if frame in _ABOVE_HOME:
         return as_typed(altitude), ""
     if frame is None or frame in _ABOVE_SEA:
-        return as_typed(altitude) - seat.home.altitude, ""
+        return as_typed(altitude) - view.home.altitude, ""
     return math.nan, f"frame {frame:g}: 0, 5 (above sea) or 3, 6 (above home)"
 
 
-def lead(link: GcsLink, altitude: float | None, speed: float | None) -> Answer:
+def command_leader(view: AutopilotView, altitude: float | None, speed: float | None) -> Answer:
     """Give a leader another altitude (m, z) or speed (m/s), at FTCC_AT."""
-    seat = link.seat
-    if not seat.leader or seat.spec.profile is None:
+    if not view.leader or view.spec.profile is None:
         return Answer(DENIED, "a follower follows: command its leaders")
-    if seat.autopilots.mode[seat.i] == HOLD:
+    if view.autopilots.mode[view.i] == HOLD:
         return Answer(BUSY, "in hold: set mode mission first")
-    at_us, why = link.failures.time()
-    why = why or _impossible(seat, altitude, speed) or _cannot_be_followed(seat, altitude, speed)
+    at_us, why = view.acting_time()
+    why = why or _impossible(view, altitude, speed) or _cannot_be_followed(view, altitude, speed)
     if why:
         return Answer(DENIED, why)
-    held = seat.autopilots.held_us[seat.i]
-    i = seat.i
-    commands, triggers = seat.autopilots.profile_commands[i], seat.autopilots.profile_triggers[i]
-    state = seat.autopilots.profile_state[i]
-    now, at = (float((t - held) / 1e6) for t in (seat.next_us, at_us))
+    held = view.autopilots.held_us[view.i]
+    i = view.i
+    commands, triggers = view.autopilots.profile_commands[i], view.autopilots.profile_triggers[i]
+    state = view.autopilots.profile_state[i]
+    now, at = (float((t - held) / 1e6) for t in (view.next_us, at_us))
     if not command_from_ground(commands, triggers, state, now, at, altitude, speed):
         return Answer(BUSY, "too many commands are waiting")
     asked = [f"{altitude:g} m"] if altitude is not None else []
     asked += [f"{speed:g} m/s"] if speed is not None else []
-    return Answer(ACCEPTED, event=f"leader commanded to {', '.join(asked)}{link.failures.later(at_us)}")
+    return Answer(ACCEPTED, event=f"leader commanded to {', '.join(asked)}{view.if_later(at_us)}")
 
 
-def _impossible(seat: Seat, altitude: float | None, speed: float | None) -> str:
+def _impossible(view: AutopilotView, altitude: float | None, speed: float | None) -> str:
     """Why no aircraft of this kind can fly so; empty if it can."""
     if altitude is not None:
         if not abs(altitude) < 1e5:
             return f"altitude {altitude:g} m: beyond 100 km"
-        if altitude < min(0.0, float(seat.autopilots.profile_state[seat.i, 1])):
+        if altitude < min(0.0, float(view.autopilots.profile_state[view.i, 1])):
             return f"altitude {altitude:g} m above home: below the ground"
     if speed is None:
         return ""
     if not 0.0 < speed < 1e3:
         return f"speed {speed:g} m/s: must be positive"
-    model = seat.spec.model
+    model = view.spec.model
     needed = level_deflections(speed, model)
     for name, unit in (("thrust", "N"), ("elevator", "rad")):
-        if name not in seat.scheme.commands:
+        if name not in view.scheme.commands:
             continue
         low, high = getattr(model, f"{name}_min"), getattr(model, f"{name}_max")
         if not low <= needed[name] <= high:
@@ -79,68 +73,25 @@ def _impossible(seat: Seat, altitude: float | None, speed: float | None) -> str:
     return ""
 
 
-def _cannot_be_followed(seat: Seat, altitude: float | None, speed: float | None) -> str:
+def _cannot_be_followed(view: AutopilotView, altitude: float | None, speed: float | None) -> str:
     """Why the scheme's conditions forbid a leader's command; empty if they do not."""
-    profile, flight = seat.spec.profile, seat.spec.flight
+    profile, flight = view.spec.profile, view.spec.flight
     assert profile is not None
     if flight is None:
         return ""
     climb, varies = flight.leader_climb, flight.leader_speed_varies
     if altitude is not None:
-        step = altitude - float(seat.autopilots.profile_state[seat.i, 1])
+        step = altitude - float(view.autopilots.profile_state[view.i, 1])
         limit = profile.climb_limit if step > 0.0 else profile.sink_limit
         climb = max(climb, min(limit, climb_of_step(profile.altitude_filter, step)))
     if speed is not None:
-        varies = varies or speed != float(seat.autopilots.profile_state[seat.i, 3])
+        varies = varies or speed != float(view.autopilots.profile_state[view.i, 3])
     asked = dataclasses.replace(flight, leader_climb=climb, leader_speed_varies=varies)
-    gains = seat.scheme.gains_type(*seat.spec.gains)
-    before = {problem.text for problem in seat.scheme.check(gains, flight) if problem.fatal}
-    fatal = [p.text for p in seat.scheme.check(gains, asked) if p.fatal and p.text not in before]
+    gains = view.scheme.gains_type(*view.spec.gains)
+    before = {problem.text for problem in view.scheme.check(gains, flight) if problem.fatal}
+    fatal = [p.text for p in view.scheme.check(gains, asked) if p.fatal and p.text not in before]
     return fatal[0] if fatal else ""
 
-
-def change_altitude(link: GcsLink, request: Request) -> Answer:
-    """DO_CHANGE_ALTITUDE; its frame is its second parameter, also in a COMMAND_INT."""
-    altitude, frame = request.parameters[:2]
-    if not math.isfinite(altitude):
-        return Answer(DENIED, "altitude: must be finite")
-    altitude, why = _above_home(link.seat, altitude, frame)
-    return Answer(DENIED, why) if why else lead(link, altitude, None)
-
-
-def change_speed(link: GcsLink, request: Request) -> Answer:
-    """DO_CHANGE_SPEED."""
-    kind, speed = request.parameters[0], as_typed(request.parameters[1])
-    if kind not in (0.0, 1.0):
-        return Answer(DENIED, "speed type: 0 airspeed, 1 ground speed")
-    if not math.isfinite(speed):
-        return Answer(DENIED, "speed: must be finite")
-    return lead(link, None, speed)
-
-
-def reposition(link: GcsLink, request: Request) -> Answer:
-    """DO_REPOSITION, the way in which QGroundControl changes an altitude, and, where nothing is given, pauses."""
-    speed, flags, radius, yaw, latitude, longitude, altitude = request.parameters
-    if any(map(math.isinf, request.parameters)):
-        return Answer(DENIED, "a number is infinite")
-    flags = 0.0 if math.isnan(flags) else flags
-    # Zeros are what a client leaves where it fills nothing in; a negative speed is the default one.
-    if any(value != 0.0 and not math.isnan(value) for value in (latitude, longitude, radius, yaw)):
-        return Answer(DENIED, _ONLY)
-    if math.isnan(altitude) and not speed > 0.0:
-        if int(flags) & _M.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
-            return set_mode(link, HOLD)
-        return Answer(DENIED, "neither an altitude nor a speed is given")
-    wanted = None
-    if not math.isnan(altitude):
-        wanted, why = _above_home(link.seat, altitude, request.frame)
-        if why:
-            return Answer(DENIED, why)
-    faster = as_typed(speed) if speed > 0.0 else None
-    return lead(link, wanted, faster)
-
-
-# Targets.
 
 _IGNORES = {
     "x": _M.POSITION_TARGET_TYPEMASK_X_IGNORE,
@@ -160,7 +111,7 @@ _NORTH_AND_LEVEL = ("vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate")
 """Zero in them is how a leader flies: northward, level, steady."""
 
 
-def read_target(seat: Seat, message: Any) -> tuple[float | None, float | None, str]:
+def read_target(view: AutopilotView, message: Any) -> tuple[float | None, float | None, str]:
     """Altitude (m, z) and forward speed (m/s) that a SET_POSITION_TARGET_* asks of a leader, or why it is refused.
 
     What its mask leaves out, and nan, is not given.
@@ -169,7 +120,7 @@ def read_target(seat: Seat, message: Any) -> tuple[float | None, float | None, s
     frame = message.coordinate_frame
     if message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT":
         values |= {"x": degrees_of(message.lat_int), "y": degrees_of(message.lon_int)}
-        values["z"], why = _above_home(seat, message.alt, frame)
+        values["z"], why = altitude_above_home(view, message.alt, frame)
     else:
         values["z"] = as_typed(-message.z)
         why = "" if frame == _M.MAV_FRAME_LOCAL_NED else f"frame {frame}: 1 (local NED)"

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.schedule import SLOWEST
-from ftcc.airside.gcs.seat import Seat
 from ftcc.airside.gcs.streams import STREAMS
+from ftcc.airside.gcs.telemetry import Telemetry
 from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
 from ftcc.link.channel import Channel
@@ -62,17 +63,17 @@ class Parameter:
 class Parameters:
     """All parameters of one autopilot, in a fixed order."""
 
-    def __init__(self, seat: Seat, rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> None:
-        self._seat = seat
-        seat.sizes.update({size.name: size.default for size in SIZES if size.name not in seat.sizes})
+    def __init__(self, view: AutopilotView, telemetry: Telemetry) -> None:
+        self._view = view
+        view.failure_sizes.update({size.name: size.default for size in SIZES if size.name not in view.failure_sizes})
         own = [
-            *_system(seat),
+            *_system(view),
             *_set_up(),
-            *_sizes(seat),
-            *_channel(seat),
-            *_fire(seat),
-            *_rates(rate_of, set_rate),
-            *_gains(seat),
+            *_sizes(view),
+            *_channel(view),
+            *_fire(view),
+            *_rates(telemetry),
+            *_gains(view),
         ]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
@@ -126,11 +127,11 @@ class Parameters:
         return True
 
 
-def _attribute(seat: Seat, name: str, parameter: str, low: float, high: float, meaning: str) -> Parameter:
+def _attribute(view: AutopilotView, name: str, parameter: str, low: float, high: float, meaning: str) -> Parameter:
     return Parameter(
         parameter,
-        lambda: float(getattr(seat, name)),
-        lambda value: setattr(seat, name, int(value)),
+        lambda: float(getattr(view, name)),
+        lambda value: setattr(view, name, int(value)),
         low,
         high,
         True,
@@ -138,25 +139,25 @@ def _attribute(seat: Seat, name: str, parameter: str, low: float, high: float, m
     )
 
 
-def _system(seat: Seat) -> Iterator[Parameter]:
-    yield _attribute(seat, "failures_enabled", "SYS_FAILURE_EN", 0, 1, "1: failures may be injected")
+def _system(view: AutopilotView) -> Iterator[Parameter]:
+    yield _attribute(view, "failures_enabled", "SYS_FAILURE_EN", 0, 1, "1: failures may be injected")
     yield Parameter(
         "COM_OF_LOSS_T",
-        lambda: seat.patience,
-        lambda value: setattr(seat, "patience", value),
+        lambda: view.offboard_timeout,
+        lambda value: setattr(view, "offboard_timeout", value),
         0.0,
         60.0,
         meaning="simulated time without targets after which offboard becomes hold, s, 0: never",
     )
     yield Parameter(
         "MIS_TAKEOFF_ALT",
-        lambda: seat.takeoff_altitude,
-        lambda value: setattr(seat, "takeoff_altitude", value),
+        lambda: view.takeoff_altitude,
+        lambda value: setattr(view, "takeoff_altitude", value),
         0.0,
         1e5,
         meaning="m, kept for clients that set it before a take-off, which does nothing in the air",
     )
-    yield _attribute(seat, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
+    yield _attribute(view, "at_ms", "FTCC_AT", 0, 2**31 - 1, "simulated ms at which failures act, 0: at once")
 
 
 _SET_UP = {
@@ -181,51 +182,52 @@ def _set_up() -> Iterator[Parameter]:
     return (fixed(name, *rest) for name, rest in _SET_UP.items())
 
 
-def _sizes(seat: Seat) -> Iterator[Parameter]:
+def _sizes(view: AutopilotView) -> Iterator[Parameter]:
+    sizes = view.failure_sizes
+
     def one(size: Size) -> Parameter:
         def write(value: float) -> None:
-            seat.sizes[size.name] = value
+            sizes[size.name] = value
 
-        return Parameter(
-            size.name, lambda: seat.sizes[size.name], write, size.low, size.high, meaning=f"{size.meaning}, {size.unit}"
-        )
+        meaning = f"{size.meaning}, {size.unit}"
+        return Parameter(size.name, lambda: sizes[size.name], write, size.low, size.high, meaning=meaning)
 
     return map(one, SIZES)
 
 
-def _channel(seat: Seat) -> Iterator[Parameter]:
-    if not seat.spec.neighbours:
+def _channel(view: AutopilotView) -> Iterator[Parameter]:
+    if not view.spec.neighbours:
         return
-    timing = seat.setting.timing
+    timing = view.setting.timing
 
     def one(name: str, field: str, high: float, meaning: str) -> Parameter:
         def write(value: float) -> None:
-            asked = seat.channel._replace(**{field: value})
+            asked = view.channel._replace(**{field: value})
             total = timing.latency_us / 1e6 + asked.delay + asked.jitter
             if total > _MOST_PERIODS * timing.exchange_us / 1e6:
                 raise RefusedError(f"{name} {value:g}: {total:g} s is over {_MOST_PERIODS} exchange periods")
-            seat.channel = asked
-            seat.inbox.quality[seat.i, : seat.inbox.degree[seat.i], Channel._fields.index(field)] = value
+            view.channel = asked
+            view.inbox.quality[view.i, : view.inbox.degree[view.i], Channel._fields.index(field)] = value
 
-        return Parameter(name, lambda: float(getattr(seat.channel, field)), write, 0.0, high, meaning=meaning)
+        return Parameter(name, lambda: float(getattr(view.channel, field)), write, 0.0, high, meaning=meaning)
 
     for name, (field, high, meaning) in _CHANNEL.items():
         yield one(name, field, high, meaning)
 
 
-def _fire(seat: Seat) -> Iterator[Parameter]:
-    """Where the fire is and where it drifts, from FTCC_AT on: to be told to all UAVs for the same time."""
-    if seat.scheme.plant != "position":
+def _fire(view: AutopilotView) -> Iterator[Parameter]:
+    """Where the fire is and where it drifts, from FTCC_AT on: to be set at all UAVs for the same time."""
+    if view.scheme.plant != "position":
         return
-    commands = seat.autopilots.reference_commands[seat.i]
-    limit = Fire(*seat.spec.reference.parameters).shift_speed
+    commands = view.autopilots.reference_commands[view.i]
+    limit = Fire(*view.spec.reference.parameters).shift_speed
 
     def one(name: str, field: str, most: float, meaning: str) -> Parameter:
         def write(value: float) -> None:
-            at_us = seat.at_ms * 1000 or seat.next_us
-            if at_us < seat.next_us:
-                raise RefusedError(f"{name}: FTCC_AT {seat.at_ms} ms is past")
-            if not change_from_ground(commands, seat.now_us / 1e6, at_us / 1e6, field, value):
+            at_us = view.at_ms * 1000 or view.next_us
+            if at_us < view.next_us:
+                raise RefusedError(f"{name}: FTCC_AT {view.at_ms} ms is past")
+            if not change_from_ground(commands, view.now_us / 1e6, at_us / 1e6, field, value):
                 raise RefusedError(f"{name}: a change of the fire at another time is waiting")
 
         return Parameter(name, lambda: float(getattr(newest(commands), field)), write, -most, most, meaning=meaning)
@@ -236,58 +238,58 @@ def _fire(seat: Seat) -> Iterator[Parameter]:
     yield one("FIRE_DRIFT_E", "drift_east", 0.99 * limit, "m/s east")
 
 
-def _rates(rate_of: Callable[[int], float], set_rate: Callable[[int, float], None]) -> Iterator[Parameter]:
+def _rates(telemetry: Telemetry) -> Iterator[Parameter]:
     def one(n: int, name: str) -> Parameter:
         def write(value: float) -> None:
             if 0.0 < value < SLOWEST:
                 raise RefusedError(f"SR_{name} {value:g}: 0, or at least {SLOWEST:g} Hz")
-            set_rate(n, value)
+            telemetry.set_default_rate(n, value)
 
-        return Parameter(f"SR_{name}", lambda: rate_of(n), write, 0.0, 1000.0, meaning="Hz, 0: silent")
+        return Parameter(f"SR_{name}", lambda: telemetry.default_rate(n), write, 0.0, 1000.0, meaning="Hz, 0: silent")
 
     return (one(n, stream.name) for n, stream in enumerate(STREAMS))
 
 
-def _gains(seat: Seat) -> Iterator[Parameter]:
+def _gains(view: AutopilotView) -> Iterator[Parameter]:
     """The scheme's gains. MAVProxy knows names in capitals only: so they are announced, in so far as they differ."""
-    if seat.leader:
+    if view.leader:
         return
-    names = seat.scheme.gains_type._fields
-    switch = seat.scheme.switches.get(FAULT_TOLERANCE, {})
-    given = dict(zip(names, seat.spec.tolerant_gains or seat.spec.gains, strict=True))
+    names = view.scheme.gains_type._fields
+    switch = view.scheme.switches.get(FAULT_TOLERANCE, {})
+    given = dict(zip(names, view.spec.tolerant_gains or view.spec.gains, strict=True))
     """Gains with fault tolerance on."""
 
     def bring_into_force(gains: dict[str, float], tolerant: bool) -> None:
-        in_force = seat.scheme.gains_type(**(gains | ({} if tolerant else switch)))
-        if seat.spec.flight is not None:
-            fatal = [p.text for p in seat.scheme.check(in_force, seat.spec.flight) if p.fatal]
+        in_force = view.scheme.gains_type(**(gains | ({} if tolerant else switch)))
+        if view.spec.flight is not None:
+            fatal = [p.text for p in view.scheme.check(in_force, view.spec.flight) if p.fatal]
             if fatal:
                 raise RefusedError(fatal[0])
-        seat.autopilots.gains[seat.i] = in_force
+        view.autopilots.gains[view.i] = in_force
 
-    ranges = seat.scheme.ranges
+    ranges = view.scheme.ranges
 
     def gain(name: str, announced: str, meaning: str) -> Parameter:
         least, most = (ranges[name].least, ranges[name].most) if name in ranges else (-_ANY, _ANY)
 
         def write(value: float) -> None:
-            bring_into_force(given | {name: value}, seat.fault_tolerance)
+            bring_into_force(given | {name: value}, view.fault_tolerance)
             given[name] = value
 
         return Parameter(announced, lambda: given[name], write, max(least, -_ANY), min(most, _ANY), meaning=meaning)
 
     capitals = [name.upper() for name in names]
-    for name, note in quantities(seat.scheme.gains_type).items():
+    for name, note in quantities(view.scheme.gains_type).items():
         announced = name.upper() if capitals.count(name.upper()) == 1 else name
         yield gain(name, announced, f"{note.meaning}, {note.unit}")
 
     if switch:
-        seat.fault_tolerance = not seat.spec.tolerant_gains
+        view.fault_tolerance = not view.spec.tolerant_gains
 
         def set_tolerance(value: float) -> None:
             bring_into_force(given, bool(value))
-            seat.fault_tolerance = bool(value)
+            view.fault_tolerance = bool(value)
 
         yield Parameter(
-            "FTCC_FT", lambda: float(seat.fault_tolerance), set_tolerance, 0, 1, True, "1: fault tolerance on"
+            "FTCC_FT", lambda: float(view.fault_tolerance), set_tolerance, 0, 1, True, "1: fault tolerance on"
         )

@@ -1,19 +1,17 @@
-"""What else a ground station says beside commands: parameters, an empty mission, time; each answered or refused."""
+"""What a ground station sends beside commands: parameters, an empty mission, time; each answered or refused."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from ftcc.airside.gcs.answers import ACCEPTED, read_request
+from ftcc.airside.gcs.commands import carry_out
 from ftcc.airside.gcs.flight_modes import set_mode
 from ftcc.airside.gcs.parameters import RefusedError
-from ftcc.link.flight_modes import mode_of
+from ftcc.airside.gcs.services import Services
+from ftcc.link.gcs_sockets import Peer
 from ftcc.link.mavlink import dialect
-
-if TYPE_CHECKING:
-    from ftcc.airside.gcs.gcs_link import GcsLink
-    from ftcc.link.gcs_sockets import Peer
 
 __all__ = ["MESSAGES", "Message"]
 
@@ -24,8 +22,8 @@ _FTP_ERRORS = {3: _FTP_END_OF_FILE, 4: _FTP_NOT_FOUND, 14: _FTP_NOT_FOUND, 15: _
 """By request: a folder is listed to its end, a file to be read is not found; all others are unknown."""
 
 
-def _parameter_list(link: GcsLink, peer: Peer, message: Any) -> None:
-    peer.send(*(link.parameters.message(n) for n in range(len(link.parameters))))
+def _parameter_list(services: Services, peer: Peer, message: Any) -> None:
+    peer.send(*(services.parameters.message(n) for n in range(len(services.parameters))))
 
 
 def _not_there(peer: Peer, message: Any) -> None:
@@ -38,91 +36,91 @@ def _not_there(peer: Peer, message: Any) -> None:
     )
 
 
-def _parameter_read(link: GcsLink, peer: Peer, message: Any) -> None:
-    n = link.parameters.find(message.param_id, message.param_index)
+def _parameter_read(services: Services, peer: Peer, message: Any) -> None:
+    n = services.parameters.find(message.param_id, message.param_index)
     if n is None:
         _not_there(peer, message)
     else:
-        peer.send(link.parameters.message(n))
+        peer.send(services.parameters.message(n))
 
 
-def _parameter_set(link: GcsLink, peer: Peer, message: Any) -> None:
+def _parameter_set(services: Services, peer: Peer, message: Any) -> None:
     """Answered with the value in force, whatever becomes of the one asked for."""
-    n = link.parameters.find(message.param_id, -1)
+    n = services.parameters.find(message.param_id, -1)
     who = f"{message.get_srcSystem()}/{message.get_srcComponent()}"
     if n is None:
         _not_there(peer, message)
         return
-    name, before = link.parameters.name(n), link.parameters.value(n)
+    name, before = services.parameters.name(n), services.parameters.value(n)
     try:
-        changed = link.parameters.set(n, message.param_value, message.param_type)
+        changed = services.parameters.set(n, message.param_value, message.param_type)
     except RefusedError as refusal:
-        link.text(_M.MAV_SEVERITY_WARNING, str(refusal), peer)
-        link.seat.note(f"parameter {name} refused: {refusal}", "warning", who, "denied")
-        peer.send(link.parameters.message(n))
+        services.outbox.send_text(_M.MAV_SEVERITY_WARNING, str(refusal), peer)
+        services.view.log(f"parameter {name} refused: {refusal}", "warning", who, "denied")
+        peer.send(services.parameters.message(n))
         return
     if changed:
-        text = f"parameter {name} = {link.parameters.value(n):.10g} (was {before:.10g})"
-        link.seat.note(text, "info", who, "accepted")
-    answer = link.parameters.message(n)
-    for other in link.peers:
+        text = f"parameter {name} = {services.parameters.value(n):.10g} (was {before:.10g})"
+        services.view.log(text, "info", who, "accepted")
+    answer = services.parameters.message(n)
+    for other in services.outbox.peers:
         if changed or other is peer:
             other.send(answer)
-    if peer not in link.peers:
+    if peer not in services.outbox.peers:
         peer.send(answer)
 
 
-def _command(link: GcsLink, peer: Peer, message: Any) -> None:
+def _command(services: Services, peer: Peer, message: Any) -> None:
     confirmation = getattr(message, "confirmation", 0)
-    link.obey(read_request(message, peer), repeated=confirmation > 0)
+    carry_out(services, read_request(message, peer), repeated=confirmation > 0)
 
 
-def _set_mode(link: GcsLink, peer: Peer, message: Any) -> None:
+def _set_mode(services: Services, peer: Peer, message: Any) -> None:
     """SET_MODE, which nothing answers but the next HEARTBEAT."""
     mode = mode_of(message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24)
     if mode is None:
-        link.text(_M.MAV_SEVERITY_WARNING, "modes: mission, hold, offboard", peer)
+        services.outbox.send_text(_M.MAV_SEVERITY_WARNING, "modes: mission, hold, offboard", peer)
         return
-    answer = set_mode(link, mode)
+    answer = set_mode(services, mode)
     if answer.result != ACCEPTED:
-        link.text(_M.MAV_SEVERITY_WARNING, answer.text, peer)
+        services.outbox.send_text(_M.MAV_SEVERITY_WARNING, answer.text, peer)
     elif answer.event:
-        link.seat.note(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
+        services.view.log(answer.event, "info", f"{message.get_srcSystem()}/{message.get_srcComponent()}", "accepted")
 
 
-def _mission_list(link: GcsLink, peer: Peer, message: Any) -> None:
+def _mission_list(services: Services, peer: Peer, message: Any) -> None:
     kind = message.mission_type
     peer.send(_M.MAVLink_mission_count_message(message.get_srcSystem(), message.get_srcComponent(), 0, kind))
 
 
-def _mission_answer(result: int) -> Callable[[GcsLink, Peer, Any], None]:
-    def handle(link: GcsLink, peer: Peer, message: Any) -> None:
+def _mission_answer(result: int) -> Callable[[Services, Peer, Any], None]:
+    def handle(services: Services, peer: Peer, message: Any) -> None:
         kind = getattr(message, "mission_type", _M.MAV_MISSION_TYPE_MISSION)
         peer.send(_M.MAVLink_mission_ack_message(message.get_srcSystem(), message.get_srcComponent(), result, kind))
 
     return handle
 
 
-def _mission_upload(link: GcsLink, peer: Peer, message: Any) -> None:
+def _mission_upload(services: Services, peer: Peer, message: Any) -> None:
     """An empty mission is what we have; any other is refused: the scenario is the mission."""
     result = _M.MAV_MISSION_ACCEPTED if message.count == 0 else _M.MAV_MISSION_UNSUPPORTED
-    _mission_answer(result)(link, peer, message)
+    _mission_answer(result)(services, peer, message)
 
 
-def _timesync(link: GcsLink, peer: Peer, message: Any) -> None:
+def _timesync(services: Services, peer: Peer, message: Any) -> None:
     """Answered with the simulated time of the last tick, by which all other messages are stamped, too."""
     if message.tc1 == 0:
         # An answer of 0 would be a question.
-        peer.send(_M.MAVLink_timesync_message(max(1, link.seat.now_us * 1000), message.ts1))
+        peer.send(_M.MAVLink_timesync_message(max(1, services.view.now_us * 1000), message.ts1))
 
 
-def _ping(link: GcsLink, peer: Peer, message: Any) -> None:
+def _ping(services: Services, peer: Peer, message: Any) -> None:
     if message.target_system == 0:
         sender = message.get_srcSystem(), message.get_srcComponent()
         peer.send(_M.MAVLink_ping_message(message.time_usec, message.seq, *sender))
 
 
-def _files(link: GcsLink, peer: Peer, message: Any) -> None:
+def _files(services: Services, peer: Peer, message: Any) -> None:
     """MAVLink FTP of a vehicle without files; answers to somebody else's questions are left alone."""
     payload = list(message.payload)
     if payload[3] >= 128:
@@ -135,18 +133,18 @@ def _files(link: GcsLink, peer: Peer, message: Any) -> None:
     peer.send(_M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer))
 
 
-def _logs(link: GcsLink, peer: Peer, message: Any) -> None:
+def _logs(services: Services, peer: Peer, message: Any) -> None:
     peer.send(_M.MAVLink_log_entry_message(0, 0, 0, 0, 0))
 
 
-def _target(link: GcsLink, peer: Peer, message: Any) -> None:
-    link.offboard.take(message)
+def _target(services: Services, peer: Peer, message: Any) -> None:
+    services.offboard.take_target(message)
 
 
 class Message(NamedTuple):
     """What is done with a message."""
 
-    handle: Callable[[Any, Any, Any], None]
+    handle: Callable[[Services, Peer, Any], None]
     does: str
     """For people."""
     changing: bool = False

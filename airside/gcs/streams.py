@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
-from ftcc.airside.gcs.seat import Seat
+from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import fields
 from ftcc.link.flight_modes import custom_mode
@@ -22,6 +22,7 @@ __all__ = [
     "STREAMS",
     "Stream",
     "heartbeat",
+    "places_of",
     "rates_of",
     "requested",
 ]
@@ -32,7 +33,7 @@ LINK_FIELDS = ("sender", "age", "received", "lost", "cut")
 _M = dialect
 
 
-def heartbeat(seat: Seat, alive: bool = True) -> Any:
+def heartbeat(view: AutopilotView, alive: bool = True) -> Any:
     """HEARTBEAT: a fixed-wing aircraft with PX4's modes, armed, in the air."""
     flags = (
         _M.MAV_MODE_FLAG_SAFETY_ARMED
@@ -42,65 +43,65 @@ def heartbeat(seat: Seat, alive: bool = True) -> Any:
         | _M.MAV_MODE_FLAG_STABILIZE_ENABLED
     )
     status = _M.MAV_STATE_ACTIVE if alive else _M.MAV_STATE_EMERGENCY
-    mode = custom_mode(int(seat.autopilots.mode[seat.i]))
+    mode = custom_mode(int(view.autopilots.mode[view.i]))
     return _M.MAVLink_heartbeat_message(_M.MAV_TYPE_FIXED_WING, _M.MAV_AUTOPILOT_PX4, flags, mode, status, 3)
 
 
-def _stamp(seat: Seat) -> int:
+def _stamp(view: AutopilotView) -> int:
     """time_boot_ms: simulated time; a uint32, it begins anew after 49.7 days."""
-    return seat.now_us // 1000 % 2**32
+    return view.now_us // 1000 % 2**32
 
 
-def _attitude(seat: Seat) -> Any:
-    q0, q1, q2, q3, p, q, r = seat.message[:7].tolist()
+def _attitude(view: AutopilotView) -> Any:
+    q0, q1, q2, q3, p, q, r = view.state[:7].tolist()
     roll = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q0 * q2 - q3 * q1))))
-    return _M.MAVLink_attitude_message(_stamp(seat), roll, pitch, _yaw(q0, q1, q2, q3), p, q, r)
+    return _M.MAVLink_attitude_message(_stamp(view), roll, pitch, _yaw(q0, q1, q2, q3), p, q, r)
 
 
 def _yaw(q0: float, q1: float, q2: float, q3: float) -> float:
     return math.atan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
 
 
-def _attitude_quaternion(seat: Seat) -> Any:
-    return _M.MAVLink_attitude_quaternion_message(_stamp(seat), *seat.message[:7].tolist())
+def _attitude_quaternion(view: AutopilotView) -> Any:
+    return _M.MAVLink_attitude_quaternion_message(_stamp(view), *view.state[:7].tolist())
 
 
-def _local_position(seat: Seat) -> Any:
-    return _M.MAVLink_local_position_ned_message(_stamp(seat), *seat.message[7:].tolist())
+def _local_position(view: AutopilotView) -> Any:
+    return _M.MAVLink_local_position_ned_message(_stamp(view), *view.state[7:].tolist())
 
 
-def _heading(seat: Seat) -> float:
+def _heading(view: AutopilotView) -> float:
     """Degrees, 0..360."""
-    return math.degrees(_yaw(*seat.message[:4].tolist())) % 360.0
+    return math.degrees(_yaw(*view.state[:4].tolist())) % 360.0
 
 
-def _global_position(seat: Seat) -> Any:
-    x, y, z, vx, vy, vz = seat.message[7:].tolist()
-    latitude, longitude = seat.home.place(x, y)
+def _global_position(view: AutopilotView) -> Any:
+    x, y, z, vx, vy, vz = view.state[7:].tolist()
+    latitude, longitude = view.home.place(x, y)
     return _M.MAVLink_global_position_int_message(
-        _stamp(seat),
+        _stamp(view),
         latitude,
         longitude,
-        whole((seat.home.altitude - z) * 1e3, 32),
+        whole((view.home.altitude - z) * 1e3, 32),
         whole(-z * 1e3, 32),
         whole(vx * 1e2, 16),
         whole(vy * 1e2, 16),
         whole(vz * 1e2, 16),
-        int(_heading(seat) * 1e2) % 36000,
+        int(_heading(view) * 1e2) % 36000,
     )
 
 
-def _gps_raw(seat: Seat) -> Any:
-    x, y, z, vx, vy, vz = seat.message[7:].tolist()
-    latitude, longitude = seat.home.place(x, y)
+def _gps_raw(view: AutopilotView) -> Any:
+    x, y, z, vx, vy, vz = view.state[7:].tolist()
+    latitude, longitude = view.home.place(x, y)
     course = math.degrees(math.atan2(vy, vx)) % 360.0
     return _M.MAVLink_gps_raw_int_message(
-        seat.now_us,
+        view.now_us,
         _M.GPS_FIX_TYPE_3D_FIX,
         latitude,
         longitude,
-        whole((seat.home.altitude - z) * 1e3, 32),
+        whole((view.home.altitude - z) * 1e3, 32),
         100,
         100,
         whole(math.sqrt(vx * vx + vy * vy + vz * vz) * 1e2, 16, signed=False),
@@ -109,14 +110,14 @@ def _gps_raw(seat: Seat) -> Any:
     )
 
 
-def _vfr_hud(seat: Seat) -> Any:
-    _, _, z, vx, vy, vz = seat.message[7:].tolist()
+def _vfr_hud(view: AutopilotView) -> Any:
+    _, _, z, vx, vy, vz = view.state[7:].tolist()
     ground = math.sqrt(vx * vx + vy * vy)
-    throttle = whole(100.0 * float(seat.controls[THRUST]), 16, signed=False)
-    altitude = seat.home.altitude - z
+    throttle = whole(100.0 * float(view.controls[THRUST]), 16, signed=False)
+    altitude = view.home.altitude - z
     # Still air: airspeed is speed.
     airspeed = math.sqrt(ground * ground + vz * vz)
-    return _M.MAVLink_vfr_hud_message(airspeed, ground, int(_heading(seat)), throttle, altitude, -vz)
+    return _M.MAVLink_vfr_hud_message(airspeed, ground, int(_heading(view)), throttle, altitude, -vz)
 
 
 _SENSORS = (
@@ -133,9 +134,9 @@ _SENSORS = (
 )
 
 
-def _sys_status(seat: Seat) -> Any:
-    lost = int(seat.inbox.edges[seat.i, : seat.inbox.degree[seat.i], 5].sum())
-    received = int(seat.inbox.edges[seat.i, : seat.inbox.degree[seat.i], 4].sum())
+def _sys_status(view: AutopilotView) -> Any:
+    lost = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], 5].sum())
+    received = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], 4].sum())
     share = round(1e4 * lost / max(1, lost + received))
     # No battery is modelled: unknown voltage and current, 100 % so that no client raises an alarm.
     # There is no fence; one that does not count as healthy is announced as breached.
@@ -145,19 +146,19 @@ def _sys_status(seat: Seat) -> Any:
     )
 
 
-def _extended_state(seat: Seat) -> Any:
+def _extended_state(view: AutopilotView) -> Any:
     return _M.MAVLink_extended_sys_state_message(_M.MAV_VTOL_STATE_UNDEFINED, _M.MAV_LANDED_STATE_IN_AIR)
 
 
-def _system_time(seat: Seat) -> Any:
+def _system_time(view: AutopilotView) -> Any:
     """The Unix time of the simulated time: that of the swarm's start, and what has been simulated since."""
-    return _M.MAVLink_system_time_message(seat.setting.epoch_us + seat.now_us, _stamp(seat))
+    return _M.MAVLink_system_time_message(view.setting.epoch_us + view.now_us, _stamp(view))
 
 
-def _servos(seat: Seat) -> Any:
-    pulses = [whole(1500.0 + 500.0 * fraction, 16, signed=False) for fraction in seat.controls.tolist()]
-    pulses[THRUST] = whole(1000.0 + 1000.0 * float(seat.controls[THRUST]), 16, signed=False)
-    return _M.MAVLink_servo_output_raw_message(seat.now_us % 2**32, 0, *pulses, 0, 0, 0, 0)
+def _servos(view: AutopilotView) -> Any:
+    pulses = [whole(1500.0 + 500.0 * fraction, 16, signed=False) for fraction in view.controls.tolist()]
+    pulses[THRUST] = whole(1000.0 + 1000.0 * float(view.controls[THRUST]), 16, signed=False)
+    return _M.MAVLink_servo_output_raw_message(view.now_us % 2**32, 0, *pulses, 0, 0, 0, 0)
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
@@ -172,32 +173,32 @@ def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, fl
     )
 
 
-def _signal(seat: Seat, *names: str) -> float | None:
+def _signal(view: AutopilotView, *names: str) -> float | None:
     """The first of the signals that the scheme has."""
-    for n, quantity in enumerate(seat.scheme.signals):
+    for n, quantity in enumerate(view.scheme.signals):
         if quantity.name in names:
-            return float(seat.autopilots.signals[seat.i, n])
+            return float(view.autopilots.signals[view.i, n])
     return None
 
 
-def _attitude_target(seat: Seat) -> Any:
-    own = fields(Own, seat.autopilots.own[seat.i])
-    if seat.scheme.plant == "attitude" and not seat.leader:
-        mu, alpha, beta = seat.autopilots.reference[seat.i, :3].tolist()
+def _attitude_target(view: AutopilotView) -> Any:
+    own = fields(Own, view.autopilots.own[view.i])
+    if view.scheme.plant == "attitude" and not view.leader:
+        mu, alpha, beta = view.autopilots.reference[view.i, :3].tolist()
         rates = 0b111
         return _M.MAVLink_attitude_target_message(
-            _stamp(seat), rates, body_attitude(own.chi, own.gamma, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
+            _stamp(view), rates, body_attitude(own.chi, own.gamma, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
         )
-    pitch = own.theta if seat.leader else _signal(seat, "theta_d")
-    rate = 0.0 if seat.leader else _signal(seat, "q_d")
+    pitch = own.theta if view.leader else _signal(view, "theta_d")
+    rate = 0.0 if view.leader else _signal(view, "q_d")
     ignored = _M.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE | _M.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
     if pitch is None:
         ignored |= _M.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
     if rate is None:
         ignored |= _M.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
-    thrust = max(0.0, min(1.0, float(seat.controls[THRUST])))
+    thrust = max(0.0, min(1.0, float(view.controls[THRUST])))
     return _M.MAVLink_attitude_target_message(
-        _stamp(seat), ignored, _quaternion(0.0, _finite(pitch), own.chi), 0.0, _finite(rate), 0.0, thrust
+        _stamp(view), ignored, _quaternion(0.0, _finite(pitch), own.chi), 0.0, _finite(rate), 0.0, thrust
     )
 
 
@@ -209,42 +210,42 @@ _NOTHING = 0b1111_1111_1111
 """POSITION_TARGET_TYPEMASK: everything ignored."""
 
 
-def _position_target(seat: Seat) -> Any:
+def _position_target(view: AutopilotView) -> Any:
     mask = _NOTHING
     x = y = z = vx = vz = 0.0
-    if seat.leader:
-        _, x, y, z, vx, _, vz = seat.autopilots.target[seat.i].tolist()
+    if view.leader:
+        _, x, y, z, vx, _, vz = view.autopilots.target[view.i].tolist()
         mask &= ~0b111_111
     else:
-        tracked = _signal(seat, "z_r", "zhat", "z_d")
+        tracked = _signal(view, "z_r", "zhat", "z_d")
         if tracked is not None and math.isfinite(tracked):
             z = tracked
             mask &= ~_M.POSITION_TARGET_TYPEMASK_Z_IGNORE
     return _M.MAVLink_position_target_local_ned_message(
-        _stamp(seat), _M.MAV_FRAME_LOCAL_NED, mask, x, y, -z, vx, 0.0, -vz, 0.0, 0.0, 0.0, 0.0, 0.0
+        _stamp(view), _M.MAV_FRAME_LOCAL_NED, mask, x, y, -z, vx, 0.0, -vz, 0.0, 0.0, 0.0, 0.0, 0.0
     )
 
 
-def _signals(seat: Seat) -> Any:
-    return float_array(seat.now_us, "signals", seat.autopilots.signals[seat.i].tolist())
+def _signals(view: AutopilotView) -> Any:
+    return float_array(view.now_us, "signals", view.autopilots.signals[view.i].tolist())
 
 
-def _links(seat: Seat) -> Any:
-    inbox, i = seat.inbox, seat.i
+def _links(view: AutopilotView) -> Any:
+    inbox, i = view.inbox, view.i
     values: list[float] = []
     for edge in range(int(inbox.degree[i])):
         sender, _, _, _, received, lost, _ = inbox.edges[i, edge].tolist()
-        cut = inbox.quality[i, edge, 6] > 0.0 or not seat.events.radio_on[i]
+        cut = inbox.quality[i, edge, 6] > 0.0 or not view.link_events.radio_on[i]
         age = float(inbox.age[i, edge]) if inbox.valid[i, edge] else -1.0
         values += [sender, age, received, lost, float(cut)]
-    return float_array(seat.now_us, "links", values)
+    return float_array(view.now_us, "links", values)
 
 
-def _home_position(seat: Seat) -> Any:
-    latitude, longitude = seat.home.place(0.0, 0.0)
-    altitude = whole(seat.home.altitude * 1e3, 32)
+def _home_position(view: AutopilotView) -> Any:
+    latitude, longitude = view.home.place(0.0, 0.0)
+    altitude = whole(view.home.altitude * 1e3, 32)
     return _M.MAVLink_home_position_message(
-        latitude, longitude, altitude, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, seat.now_us
+        latitude, longitude, altitude, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, view.now_us
     )
 
 
@@ -258,7 +259,7 @@ class Stream(NamedTuple):
     """Hz of simulated time, towards a ground station, unless asked otherwise; 0 = only when asked."""
     to_station: float
     """Hz towards the swarm's own station, which logs everything."""
-    make: Callable[[Seat], Any]
+    make: Callable[[AutopilotView], Any]
     followers_only: bool = False
     logged: float = 0.0
     """Hz of simulated time that the station has at least, also where the swarm flies faster than the clock."""
@@ -288,15 +289,24 @@ LOGGED = tuple(stream.logged for stream in STREAMS)
 """Least rates towards the station in the order of `STREAMS`, Hz."""
 
 
-def rates_of(seat: Seat, station: bool) -> list[float]:
+def rates_of(view: AutopilotView, station: bool) -> list[float]:
     """Rates in the order of `STREAMS`, Hz, towards a ground station or the swarm's own."""
     return [
-        0.0 if stream.followers_only and seat.leader else stream.to_station if station else stream.rate
+        0.0 if stream.followers_only and view.leader else stream.to_station if station else stream.rate
         for stream in STREAMS
     ]
 
 
-def _autopilot_version(seat: Seat) -> Any:
+def places_of(view: AutopilotView, message: float) -> list[int]:
+    """Places in `STREAMS` of a message, by its number, that this UAV has."""
+    return [
+        n
+        for n, stream in enumerate(STREAMS)
+        if stream.message == message and not (stream.followers_only and view.leader)
+    ]
+
+
+def _autopilot_version(view: AutopilotView) -> Any:
     capabilities = (
         _M.MAV_PROTOCOL_CAPABILITY_MISSION_INT
         | _M.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
@@ -310,25 +320,21 @@ def _autopilot_version(seat: Seat) -> Any:
     version = 1 << 24 | 15 << 16 | 255
     nothing = (0,) * 8
     return _M.MAVLink_autopilot_version_message(
-        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, seat.setting.system(seat.spec.uav)
+        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, view.setting.system(view.spec.uav)
     )
 
 
-ON_REQUEST: dict[int, Callable[[Seat], Any]] = {
+ON_REQUEST: dict[int, Callable[[AutopilotView], Any]] = {
     _M.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
     _M.MAVLINK_MSG_ID_HOME_POSITION: _home_position,
     _M.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
-    _M.MAVLINK_MSG_ID_MISSION_CURRENT: lambda seat: _M.MAVLink_mission_current_message(0),
+    _M.MAVLINK_MSG_ID_MISSION_CURRENT: lambda view: _M.MAVLink_mission_current_message(0),
 }
 """Messages that come when they are asked for, beside those of `STREAMS`."""
 
 
-def requested(seat: Seat, message: int) -> list[Any]:
+def requested(view: AutopilotView, message: int) -> list[Any]:
     """What REQUEST_MESSAGE brings; nothing where the message is unknown here."""
     if message in ON_REQUEST:
-        return [ON_REQUEST[message](seat)]
-    return [
-        stream.make(seat)
-        for stream in STREAMS
-        if stream.message == message and not (stream.followers_only and seat.leader)
-    ]
+        return [ON_REQUEST[message](view)]
+    return [STREAMS[n].make(view) for n in places_of(view, message)]

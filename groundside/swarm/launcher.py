@@ -173,7 +173,7 @@ class Swarm:
     def start(self) -> None:
         """Start all processes."""
         # Imported by name only when a child needs them: the launcher itself flies nothing.
-        from ftcc.airside.process import run as run_autopilots
+        from ftcc.airside.process import main as run_autopilots
         from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,4 +1,4 @@
-"""A real autopilot process's crew for one UAV, alone, with a test in the place of its vehicle."""
+"""A real autopilot process for one UAV, alone, with a test in the place of its vehicle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ftcc.airside.process import Crew
+from ftcc.airside.process import AutopilotProcess
 from ftcc.airside.scheme import Flight
 from ftcc.airside.spec import Neighbour
 from ftcc.link.gate import Gate, Go, Limit, Pace, Release, Stop
@@ -33,7 +33,7 @@ def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarr
 
 
 class Bench:
-    """The crew, its sockets and its gate; as a context it flies in a thread. Its ``neighbours`` never say anything."""
+    """The process, its sockets and its gate; as a context it flies in a thread. Its ``neighbours`` send nothing."""
 
     def __init__(
         self,
@@ -57,8 +57,8 @@ class Bench:
         self.station = Endpoint(STATION, 1, self.block.station)
         spec = autopilot(uav, neighbours=tuple(Neighbour(other, 0.5) for other in neighbours), flight=FLIGHT)
         # Nobody waits for neighbours that are not there.
-        self.crew = Crew([spec], shared, Gate(pipe, gone=set(neighbours)))
-        self._thread = threading.Thread(target=self.crew.fly)
+        self.process = AutopilotProcess([spec], shared, Gate(pipe, gone=set(neighbours)))
+        self._thread = threading.Thread(target=self.process.fly)
 
     def __enter__(self) -> Bench:
         self.launcher.send(Go(Pace(0.0, 0, 1.0), Limit(None)))
@@ -73,7 +73,7 @@ class Bench:
 
     def close(self) -> None:
         """Free the ports."""
-        self.crew.close()
+        self.process.close()
         self.vehicle.close()
         self.station.close()
         self.block.release()

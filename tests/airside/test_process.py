@@ -32,14 +32,14 @@ def state(tick: int) -> tuple[object, ...]:
 
 
 def taken(bench: Bench) -> list[int]:
-    """Ticks of the states that the crew takes in, one after the other, until its socket is empty."""
-    crew, ticks = bench.crew, []
-    while select.select([crew.vehicles[0]], [], [], 0.05)[0]:
-        if crew.flight.listen(crew.group, crew.timing) == DATAGRAM:
-            crew.take_datagram()
-        if crew.group.pending[0] >= 0:
-            ticks.append(int(crew.group.pending[0]))
-            crew.group.done[0], crew.group.pending[0] = crew.group.pending[0], -1
+    """Ticks of the states that the process takes in, one after the other, until its socket is empty."""
+    process, ticks = bench.process, []
+    while select.select([process.vehicles[0]], [], [], 0.05)[0]:
+        if process.flight.listen(process.group, process.timing) == DATAGRAM:
+            process.take_datagram()
+        if process.group.pending[0] >= 0:
+            ticks.append(int(process.group.pending[0]))
+            process.group.done[0], process.group.pending[0] = process.group.pending[0], -1
     return ticks
 
 
@@ -76,9 +76,9 @@ def test_an_autopilot_whose_aircraft_is_lost_answers_the_states_before_that_and_
     bench.vehicle.send(lost)
     with bench:
         until = time.monotonic() + 10.0
-        while bench.crew.group.alive.any() and time.monotonic() < until:
+        while bench.process.group.alive.any() and time.monotonic() < until:
             time.sleep(0.001)
-        assert not bench.crew.group.alive.any(), "nobody need stop it"
+        assert not bench.process.group.alive.any(), "nobody need stop it"
     stamps = [read_command(message, np.zeros(4)) for message in bench.vehicle.receive()]
     assert list(dict.fromkeys(stamps)) == [0, 10_000, 20_000]
 

@@ -70,10 +70,10 @@ def test_before_the_first_tick_an_answer_is_no_question(tmp_path, monkeypatch):
 def test_after_fifty_days_the_32_bit_stamps_begin_anew_and_the_others_go_on(bench, station):
     """As documented: time_boot_ms and SERVO_OUTPUT_RAW's time_usec are uint32."""
     days = 50 * 86_400 * 1000
-    seat = replace(bench.crew.ground[0].seat, done=np.array([days // 10]))  # ticks of 10 ms
+    view = replace(bench.process.gcs_links[0].view, done=np.array([days // 10]))  # ticks of 10 ms
     codec = Codec(1, 1)
     for stream in STREAMS:
-        (message,) = codec.parse(codec.pack(stream.make(seat)))
+        (message,) = codec.parse(codec.pack(stream.make(view)))
         if hasattr(message, "time_boot_ms"):
             assert message.time_boot_ms == days % 2**32 < days
         if hasattr(message, "time_usec"):
@@ -95,7 +95,7 @@ def until(condition):
 
 def test_offboard_is_lost_after_so_much_simulated_time_however_long_the_flight_is_held(leader):
     bench, station = leader
-    mode = bench.crew.group.autopilots.mode
+    mode = bench.process.group.autopilots.mode
     station.set(7, "COM_OF_LOSS_T", 0.5)
     station.send(7, target(station, 1010.0))
     station.command(7, M.MAV_CMD_DO_SET_MODE, *OFFBOARD_MODE)

@@ -118,7 +118,7 @@ def flight(tmp_path, monkeypatch, sent, ticks):
             while bench.launcher.poll(0.0):
                 bench.launcher.recv()
             controls.append(bench.answer(tick, LEVEL, np.zeros(4)).copy())
-        return np.array(controls), bench.crew.ground[0].faults, answers, station.parameters(1)
+        return np.array(controls), bench.process.gcs_links[0].errors, answers, station.parameters(1)
 
 
 @pytest.mark.parametrize("make", [commands, messages])
@@ -167,7 +167,7 @@ def test_a_handler_that_raises_drops_its_message_is_told_once_and_the_flight_goe
         station.send(1, M.MAVLink_ping_message(0, n, 0, 0))
     assert station.get(1, "K11") == 3.0
     bench.answer(1, LEVEL, np.zeros(4))
-    assert bench.crew.ground[0].faults == {"PING": 5}
+    assert bench.process.gcs_links[0].errors == {"PING": 5}
     told = [event for event in said(bench) if "PING" in event.text]
     assert [(event.severity, event.text) for event in told] == [
         ("error", "PING failed, a fault of this software: ZeroDivisionError('a fault of ours')")

@@ -113,9 +113,9 @@ def test_all_parameters_are_listed_gains_and_sizes_among_them(station):
 
 def test_a_value_that_was_typed_is_the_value_in_force(bench, station):
     assert station.set(1, "k11", 3.3) == 3.3
-    assert bench.crew.group.autopilots.gains[0, 0] == 3.3
+    assert bench.process.group.autopilots.gains[0, 0] == 3.3
     assert station.set(1, "ch_loss", 0.3) == 0.3
-    assert bench.crew.group.inbox.quality[0, :2, 0].tolist() == [0.3, 0.3]
+    assert bench.process.group.inbox.quality[0, :2, 0].tolist() == [0.3, 0.3]
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_refused_value_leaves_the_one_in_force(bench, station, name, value, wh
 def test_a_gain_is_never_nan(bench, station, value):
     station.send(1, M.MAVLink_param_set_message(1, 1, b"K11", value, M.MAV_PARAM_TYPE_REAL32))
     assert station.get(1, "K11") == 3.0
-    assert np.isfinite(bench.crew.group.autopilots.gains).all()
+    assert np.isfinite(bench.process.group.autopilots.gains).all()
 
 
 def test_a_parameter_that_does_not_exist_is_refused(station):
@@ -162,11 +162,11 @@ def test_fault_tolerance_off_flies_the_gains_of_the_switch_and_on_the_former_one
     names = find("containment").gains_type._fields
     observers = names.index("observers")
     station.fault_tolerance(1, False)
-    assert bench.crew.group.autopilots.gains[0, observers] == 0.0
+    assert bench.process.group.autopilots.gains[0, observers] == 0.0
     station.set(1, "K11", 3.5)
     station.fault_tolerance(1, True)
-    assert bench.crew.group.autopilots.gains[0, observers] == 1.0
-    assert bench.crew.group.autopilots.gains[0, 0] == 3.5
+    assert bench.process.group.autopilots.gains[0, observers] == 1.0
+    assert bench.process.group.autopilots.gains[0, 0] == 3.5
 
 
 # Failures.
@@ -271,7 +271,7 @@ def test_a_repeated_command_is_answered_as_before_and_obeyed_once(bench, station
 
 
 def test_links_are_cut_degraded_and_restored_at_their_time(bench, station):
-    quality = bench.crew.group.inbox.quality[0]
+    quality = bench.process.group.inbox.quality[0]
     station.inject(1, "radio", "off", 2)
     station.inject(1, "radio", "intermittent", 6, loss=0.4)
     station.inject(1, "radio", "delayed", 6, delay=0.2)
@@ -292,10 +292,10 @@ def test_links_are_cut_degraded_and_restored_at_their_time(bench, station):
 def test_the_own_radio_is_switched_off_and_on(bench, station):
     station.cut(1)
     bench.answer(1, LEVEL, np.zeros(4))
-    assert bench.crew.group.events.radio_on[0] == 0
+    assert bench.process.group.events.radio_on[0] == 0
     station.restore(1)
     bench.answer(2, LEVEL, np.zeros(4))
-    assert bench.crew.group.events.radio_on[0] == 1
+    assert bench.process.group.events.radio_on[0] == 1
 
 
 # Modes.
@@ -303,10 +303,10 @@ def test_the_own_radio_is_switched_off_and_on(bench, station):
 
 def test_hold_ignores_the_neighbours_and_mission_hears_them_again(bench, station):
     station.mode(1, "hold")
-    assert bench.crew.group.autopilots.mode[0] == HOLD
+    assert bench.process.group.autopilots.mode[0] == HOLD
     assert station.state(1).mode == "hold"
     station.mode(1, "mission")
-    assert bench.crew.group.autopilots.mode[0] == MISSION
+    assert bench.process.group.autopilots.mode[0] == MISSION
 
 
 def test_a_follower_of_leaders_takes_no_targets_and_is_no_leader(station):
@@ -328,7 +328,7 @@ def test_modes_that_mean_nothing_here_are_denied(station, pair):
 def test_a_state_is_answered_whatever_strangers_send(bench, station):
     """Random bytes and messages with random contents to the port that hears everybody: the tick does not mind."""
     random = np.random.default_rng(1)
-    gains = bench.crew.group.autopilots.gains.copy()
+    gains = bench.process.group.autopilots.gains.copy()
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as stranger:
         for tick in range(1, 51):
             for _ in range(20):
@@ -338,8 +338,8 @@ def test_a_state_is_answered_whatever_strangers_send(bench, station):
                 stranger.sendto(bytes(good) if random.random() < 0.5 else noise, (LOOPBACK, bench.block.of(1).ground))
             bench.answer(tick, LEVEL, np.zeros(4))
     assert station.get(1, "K11") == 3.0
-    assert np.array_equal(bench.crew.group.autopilots.gains, gains)
-    assert bench.crew.ground[0].dropped()["bad_data"] > 500
+    assert np.array_equal(bench.process.group.autopilots.gains, gains)
+    assert bench.process.gcs_links[0].dropped()["bad_data"] > 500
 
 
 def anything(random: np.random.Generator, kind: Any) -> Any:
@@ -378,7 +378,11 @@ def test_valid_messages_with_any_contents_are_survived(bench, station):
         if n % 20 == 0:
             bench.answer(n // 20 + 1, LEVEL, np.zeros(4))
     assert station.state(1).uav == 1
-    for array in (bench.crew.group.autopilots.gains, bench.crew.group.inbox.quality, bench.crew.group.controls):
+    for array in (
+        bench.process.group.autopilots.gains,
+        bench.process.group.inbox.quality,
+        bench.process.group.controls,
+    ):
         assert np.isfinite(array).all()
 
 

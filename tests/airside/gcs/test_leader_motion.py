@@ -28,7 +28,7 @@ def leader(tmp_path, monkeypatch):
 
 def commanded(bench):
     """Altitude and speed that the ground has commanded last; None if none."""
-    rows = [row for row in bench.crew.group.autopilots.profile_commands[0][-4:].tolist() if row[0] < math.inf]
+    rows = [row for row in bench.process.group.autopilots.profile_commands[0][-4:].tolist() if row[0] < math.inf]
     return tuple(rows[-1][1:]) if rows else None
 
 
@@ -133,11 +133,11 @@ def test_the_present_mode_set_again_changes_nothing(leader):
     assert commanded(bench) == (1010.0, 30.0)
     station.send(7, local(Z, z=-1010.0))
     station.mode(7, "offboard")
-    ends = bench.crew.ground[0].offboard.next_us
+    ends = bench.process.gcs_links[0].services.offboard.next_us
     for tick in range(1, 51):
         bench.answer(tick, LEVEL, np.zeros(4))
     station.mode(7, "offboard")
-    assert bench.crew.ground[0].offboard.next_us == ends
+    assert bench.process.gcs_links[0].services.offboard.next_us == ends
 
 
 # Targets.

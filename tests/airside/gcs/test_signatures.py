@@ -70,7 +70,7 @@ def test_who_has_the_key_is_obeyed_and_nobody_else(signed):
     assert station.set(1, "K11", 3.0) == 3.0
     station._socket.sendto(replayed, port)
     assert station.get(1, "K11") == 3.0
-    counted = bench.crew.ground[0].dropped()
+    counted = bench.process.gcs_links[0].dropped()
     assert {reason: counted.get(reason) for reason in ("unsigned", "repeated")} == {"unsigned": 1, "repeated": 1}
 
 
@@ -95,7 +95,7 @@ def test_each_reason_and_sender_is_told_once_and_every_message_counted(signed, k
         ("255/194", "refused: signed by 255/194 before and sent again, or its clock was put back"),
         ("255/193", "refused: signed by 255/193, 75 s behind: its clock?"),
     ]
-    counted = bench.crew.ground[0].dropped()
+    counted = bench.process.gcs_links[0].dropped()
     assert [counted[reason] for reason in ("unsigned", "other key", "late", "repeated")] == [3, 3, 4, 2]
 
 

@@ -1,4 +1,4 @@
-"""What an autopilot's side towards the ground sees of it, and may touch: one autopilot among those of its process."""
+"""All that the modules of this package see of an autopilot and may change: one among those of its process."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from ftcc.link.gate import Said
 from ftcc.link.home import Home
 from ftcc.link.mavlink import Endpoint
 from ftcc.link.process import Setting
+from ftcc.link.text import as_seconds
 
-__all__ = ["Home", "Seat"]
+__all__ = ["AutopilotView"]
 
 
 @dataclass
-class Seat:
-    """One autopilot: its row of the arrays, its vehicle, and how it speaks to its launcher."""
+class AutopilotView:
+    """One autopilot: its row of the arrays, its vehicle, and its way to the launcher's log."""
 
     spec: AutopilotSpec
     i: int
@@ -32,22 +33,21 @@ class Seat:
     scheme: Scheme
     autopilots: Autopilots
     inbox: Inbox
-    events: LinkEvents
-    message: NDArray[np.float64]
+    link_events: LinkEvents
+    state: NDArray[np.float64]
     """(13,): the vehicle's last state, as its messages bring it."""
     controls: NDArray[np.float64]
     """(4,): the last command, fractions of travel."""
     vehicle: Endpoint
-    tell: Callable[[Said], None]
-    """Says something to the launcher."""
+    send_to_launcher: Callable[[Said], None]
     done: NDArray[np.int64]
     """(1,): its last tick; -1 before the first."""
     alive: bool = True
-    sizes: dict[str, float] = field(default_factory=dict)
+    failure_sizes: dict[str, float] = field(default_factory=dict)
     """Parameters FAIL_*: how large the next failure is."""
     at_ms: int = 0
     """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
-    patience: float = 1.0
+    offboard_timeout: float = 1.0
     """Parameter COM_OF_LOSS_T: simulated time without targets after which offboard becomes hold, s; 0 = never."""
     takeoff_altitude: float = 10.0
     """Parameter MIS_TAKEOFF_ALT, m: without effect."""
@@ -80,9 +80,24 @@ class Seat:
         """Simulated time of the next tick, the earliest at which anything can act."""
         return (int(self.done[0]) + 1) * self.setting.timing.period_us
 
-    def note(
+    def acting_time(self) -> tuple[int, str]:
+        """When what the ground asks for now acts (FTCC_AT), us, or why it cannot."""
+        at_us = self.at_ms * 1000
+        if at_us == 0:
+            return self.next_us, ""
+        if at_us < self.next_us:
+            return 0, f"FTCC_AT {self.at_ms} ms is past"
+        if at_us > self.setting.timing.ticks * self.setting.timing.period_us:
+            return 0, f"FTCC_AT {self.at_ms} ms: after the end"
+        return at_us, ""
+
+    def if_later(self, at_us: int) -> str:
+        """ " at t = ..." where something does not act at once."""
+        return f" at t = {as_seconds(at_us)} s" if at_us > self.next_us else ""
+
+    def log(
         self, text: str, severity: str = "info", who: str = "", outcome: str = "", at_us: int | None = None
     ) -> None:
-        """Have something logged and shown on the ground."""
+        """Have the launcher log an event and show it on the ground; without ``at_us`` it is one of the last tick."""
         when = self.now_us if at_us is None else at_us
-        self.tell(Said(severity, text, self.spec.uav, when, who, outcome))
+        self.send_to_launcher(Said(severity, text, self.spec.uav, when, who, outcome))
