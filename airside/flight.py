@@ -1,20 +1,21 @@
 """The flight of an autopilot process, compiled: from the states of its vehicles to the commands that answer them.
 
-A template, see `link.compiled`: the free name ``stages`` is the module `tick` for a scheme. `group.flight_of`
-gives this module with it filled in. `tick` lists the stages; the rest waits for what a tick needs. No stage reads a
-wall clock.
+A template, see `instantiate`: the free name ``stages`` is the module `stages` for a scheme. `compiled_stages.flight_of`
+gives this module with it filled in. `tick` lists the stages in their order, and the functions below it do each for one
+UAV; the rest waits for what a tick needs. No stage reads a wall clock.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from ftcc.airside.autopilots import aim
-from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE
+from ftcc.airside.flight_path import Own
+from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import encode_command
+from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import report_link
-from ftcc.link.compiled import compiled_apart, compiled_to_wait, compiled_within, copy
+from ftcc.link.compiled import compiled, compiled_apart, compiled_to_wait, compiled_within, copy
 from ftcc.link.exchange import append, begin
 from ftcc.link.process import RESEND
 from ftcc.link.recording import is_full
@@ -35,12 +36,15 @@ from ftcc.link.wire import (
 
 __all__ = ["fly", "take", "tick"]
 
+# A template has no such name until `instantiate` gives it.
 if "stages" not in globals():
-    raise ImportError("ftcc.airside.flight is a template: use ftcc.airside.group.flight_of(scheme)")
+    raise ImportError("ftcc.airside.flight is a template: use ftcc.airside.compiled_stages.flight_of(scheme)")
 
 stages: Any = globals()["stages"]
 
-_tell = stages.tell
+_publish = stages.publish
+
+_V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
 
 _DATAGRAMS = 64
 """Read of one vehicle at a time, at most: a flood must not hold up the others for ever."""
@@ -85,17 +89,17 @@ def tick(group, timing, now_us):
             control(group, timing, i, now_us)
             actuate(group, i, now_us)
     if now_us % timing.exchange_us == 0:
-        if group.linked[0] == 1:
-            # Those who hear nobody's record in it hear how far this process has heard.
+        if group.on_mesh[0] == 1:
+            # Also without a record in it a transmission acknowledges what this process has received.
             begin(
                 group.transmission, now_us // timing.exchange_us, group.complete[0], 0, group.autopilots.shared.shape[1]
             )
         for i in every:
             if group.active[i] == 1:
-                tell(group, timing, i, now_us)
+                publish(group, timing, i, now_us)
     for i in every:
         if group.active[i] == 1:
-            report(group, timing, i, now_us)
+            record(group, timing, i, now_us)
 
 
 @compiled_within
@@ -105,26 +109,26 @@ def sense(group, i, now_us):
     Where the vehicle does not say which command is in force, it is the one that answers its last state.
     """
     copy(group.arrived[i], group.states[i])
-    copy(group.arrived_controls[i] if group.told[i] == 1 else group.controls[i], group.reported[i])
+    copy(group.arrived_controls[i] if group.command_reported[i] == 1 else group.controls[i], group.reported[i])
     group.pending[i] = -1
     _sense(group.autopilots, i, group.states[i], group.reported[i], now_us)
 
 
 @compiled_within
 def hear(group, timing, i, now_us):
-    """The records that are due, through the channel into the inbox."""
+    """Take the records that are due through the channel into the inbox."""
     _hear(group.exchange, group.inbox, group.events, timing, i, now_us)
 
 
 @compiled_within
 def refer(group, timing, i, now_us):
-    """What is tracked: a leader's profile, a follower's own reference."""
+    """The reference at this tick: a leader's profile, a follower's own."""
     _refer(group.autopilots, group.inbox, i, now_us, timing.period_us)
 
 
 @compiled_within
 def control(group, timing, i, now_us):
-    """The law; a UAV whose command is not finite ends here."""
+    """Step the law; a UAV whose command is not finite ends here."""
     group.done[i] = now_us // timing.period_us
     autopilots = group.autopilots
     if autopilots.leader[i] == 1:
@@ -134,19 +138,29 @@ def control(group, timing, i, now_us):
     else:
         group.active[i] = 0
         group.alive[i] = 0
-        group.given_up[0] += 1
+        group.lost[0] += 1
+
+
+@compiled
+def encode_attitude(autopilots, i, target, controls):
+    """The command of UAV ``i`` as an attitude target (5,), and what the vehicle reads of it, in fractions of travel."""
+    own = autopilots.own[i]
+    V, gamma, chi = own[_V], own[_GAMMA], own[_CHI]
+    encode_target(autopilots.command[i], V, gamma, chi, autopilots.travel[i], autopilots.code[i], target)
+    decode_target(target, V, gamma, chi, autopilots.travel[i], autopilots.code[i], controls)
+    encode_command(controls, autopilots.travel[i], controls)
 
 
 @compiled_within
 def actuate(group, i, now_us):
-    """The command to the vehicle."""
+    """Send the command to the vehicle."""
     if group.active[i] == 0:
         return
     wire, autopilots = group.wire, group.autopilots
     if group.travels_by[i] == BY_POSITION:
         sent = send_position_target(wire, i, autopilots.target[i])
     elif group.travels_by[i] == BY_ATTITUDE:
-        aim(autopilots, i, group.target, group.controls[i])
+        encode_attitude(autopilots, i, group.target, group.controls[i])
         sent = send_attitude_target(wire, i, now_us, group.target)
     else:
         sent = send_command(wire, i, now_us, group.controls[i])
@@ -155,10 +169,10 @@ def actuate(group, i, now_us):
 
 
 @compiled_within
-def tell(group, timing, i, now_us):
-    """A record for the neighbours: here those in this process, with the next transmission the others."""
+def publish(group, timing, i, now_us):
+    """Post a record to the out-neighbours in this process, and put it into the next transmission for the others."""
     sequence = now_us // timing.exchange_us
-    _tell(group.autopilots, group.exchange, group.events, i, sequence, now_us)
+    _publish(group.autopilots, group.exchange, group.events, i, sequence, now_us)
     if group.heard_outside[i] == 1:
         uav, radio_on = group.wire.system[i], group.events.radio_on[i]
         if not append(group.transmission, uav, sequence, now_us, radio_on, group.autopilots.shared[i]):
@@ -166,8 +180,8 @@ def tell(group, timing, i, now_us):
 
 
 @compiled_within
-def report(group, timing, i, now_us):
-    """A row of the recording, and one on each in-edge, where they are due."""
+def record(group, timing, i, now_us):
+    """Write a row of the recording, and one on each in-edge, where they are due."""
     n = now_us // timing.period_us
     rows, links = group.rows, group.link_rows
     if n % timing.record_every == 0 and group.autopilots.leader[i] == 0:
@@ -186,7 +200,7 @@ def report(group, timing, i, now_us):
 
 @compiled_within
 def something_to_do(group, timing, now_us):
-    """Whether Python has something to do after this tick; what, says ``to_do``."""
+    """Set ``to_do``; whether Python has something to do after this tick."""
     to_do = 0
     if group.transmission.used[0] > 0:
         to_do |= PUBLISH
@@ -195,11 +209,11 @@ def something_to_do(group, timing, now_us):
     if now_us // timing.period_us % ticks_a_second(timing.period_us) == 0:
         to_do |= SECOND
     if group.autopilots.events.used[0] > 0:
-        to_do |= NOTE
-    if group.given_up[0] > 0 or group.unsendable[0] > 0:
-        to_do |= GIVE_UP
-    if now_us >= group.report_us[0] and monotonic(group.room) >= group.report_wall[0]:
-        to_do |= REPORT
+        to_do |= EVENTS
+    if group.lost[0] > 0 or group.unsendable[0] > 0:
+        to_do |= LOST
+    if now_us >= group.telemetry_us[0] and monotonic(group.room) >= group.telemetry_wall[0]:
+        to_do |= TELEMETRY
     group.to_do[0] = to_do
     return to_do > 0
 
@@ -209,13 +223,13 @@ def something_to_do(group, timing, now_us):
 
 @compiled_within
 def take(group, timing, i):
-    """Take in the datagram at hand for UAV ``i``; one that was answered already is answered once more."""
-    stamp, told = read_state(group.wire, group.arrived[i], group.arrived_controls[i])
+    """Read the datagram at hand for UAV ``i``; one that was answered already is answered once more."""
+    stamp, reported = read_state(group.wire, group.arrived[i], group.arrived_controls[i])
     n = tick_of(stamp, timing.period_us)
     if n < 0:
         return DATAGRAM
     if n > group.done[i]:
-        group.pending[i], group.told[i] = n, told
+        group.pending[i], group.command_reported[i] = n, reported
     elif n == group.done[i]:
         send_again(group.wire, i)
     return GO_ON

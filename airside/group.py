@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import Autopilots, build, tick_of
+from ftcc.airside.autopilots import Autopilots, build
 from ftcc.airside.link_events import LinkEvents, link_events
 from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Inbox
-from ftcc.link.compiled import instantiate, uncompile
 from ftcc.link.exchange import Exchange, Transmission, new_exchange, new_transmission
 from ftcc.link.mavlink import AUTOPILOT
 from ftcc.link.messages import AttitudeTarget, StateMessage
@@ -22,22 +20,12 @@ from ftcc.link.recording import Rows
 from ftcc.link.timing import Timing
 from ftcc.link.wire import BY_ACTUATORS, BY_ATTITUDE, BY_POSITION, Wire, new_wire
 
-__all__ = ["GIVE_UP", "NOTE", "PUBLISH", "REPORT", "SECOND", "WRITE", "AutopilotGroup", "build_group", "flight_of"]
+__all__ = ["EVENTS", "LOST", "PUBLISH", "SECOND", "TELEMETRY", "WRITE", "AutopilotGroup", "build_group"]
 
 
-@functools.cache
-def flight_of(scheme: str) -> ModuleType:
-    """The flight of autopilots under a scheme, see `flight`: compiled, or plain Python if numba refuses the scheme."""
-    stages = tick_of(scheme)
-    flight = instantiate("ftcc.airside.flight", scheme, stages=stages)
-    if stages.REFUSAL:
-        uncompile([flight])
-    return flight
-
-
-PUBLISH, WRITE, NOTE, GIVE_UP, REPORT, SECOND = 1, 2, 4, 8, 16, 32
-"""What there may be to do after a tick: a transmission for the mesh, full rows, events, a UAV that ends, telemetry; and
-whether a simulated second is full."""
+PUBLISH, WRITE, EVENTS, LOST, TELEMETRY, SECOND = 1, 2, 4, 8, 16, 32
+"""What there may be to do after a tick: a transmission for the mesh, full rows, events, UAVs that are lost, telemetry;
+and whether a simulated second is full."""
 
 
 class AutopilotGroup(NamedTuple):
@@ -58,10 +46,10 @@ class AutopilotGroup(NamedTuple):
     """(k,): 0 once a UAV has ended."""
     active: NDArray[np.int64]
     """(k,): 1 for those that take part in this tick."""
-    linked: NDArray[np.int64]
+    on_mesh: NDArray[np.int64]
     """(1,): 1 where the process puts transmissions on the mesh."""
     heard_outside: NDArray[np.int64]
-    """(k,): 1 for those that UAVs of other processes hear."""
+    """(k,): 1 for those that have out-neighbours in other processes."""
     travels_by: NDArray[np.int64]
     """(k,): how commands travel to the vehicles, see `wire`."""
     pending: NDArray[np.int64]
@@ -70,8 +58,8 @@ class AutopilotGroup(NamedTuple):
     """(k, 13): that state, see ``messages.StateMessage``."""
     arrived_controls: NDArray[np.float64]
     """(k, 4): the command in force that came with it, fractions of travel."""
-    told: NDArray[np.int64]
-    """(k,): whether one came; otherwise it is the command that answers the last state."""
+    command_reported: NDArray[np.int64]
+    """(k,): whether such a command came; otherwise the one that answers the last state is in force."""
     states: NDArray[np.float64]
     """(k, 13): the states of this tick."""
     reported: NDArray[np.float64]
@@ -82,24 +70,24 @@ class AutopilotGroup(NamedTuple):
     """(5,): room for an attitude target."""
     done: NDArray[np.int64]
     """(k,): the last tick of each."""
-    given_up: NDArray[np.int64]
-    """(1,): UAVs whose law gave no finite command and of which nobody was told yet."""
+    lost: NDArray[np.int64]
+    """(1,): UAVs whose law gave no finite command and whose end is not reported yet."""
     unsendable: NDArray[np.int64]
     """(1,): 1 where something that was to be sent is not finite."""
     complete: NDArray[np.int64]
     """(1,): lockstep: all transmissions of other processes up to this number are here."""
     acknowledged: NDArray[np.int64]
-    """(1,): lockstep: those who hear this process have its transmissions up to this number."""
+    """(1,): lockstep: all receivers of this process have its transmissions up to this number."""
     mail: NDArray[np.int64]
     """(1,): 1 where the mesh has brought something."""
     to_do: NDArray[np.int64]
     """(1,): what Python has to do after a tick: `PUBLISH`, `WRITE`, ... added up."""
-    report_us: NDArray[np.int64]
-    """(1,): simulated time from which on something is to be told to the ground,"""
-    report_wall: NDArray[np.float64]
+    telemetry_us: NDArray[np.int64]
+    """(1,): simulated time from which on there is telemetry to send,"""
+    telemetry_wall: NDArray[np.float64]
     """(1,): and wall time, s (monotonic): both must have come."""
     attention: NDArray[np.float64]
-    """(1,): wall time from which on Python wants to look around, s (monotonic)."""
+    """(1,): wall time at which Python looks at its other sockets next, s (monotonic)."""
     since: NDArray[np.float64]
     """(1,): wall time since which states are awaited, s."""
     room: NDArray[np.int64]
@@ -130,26 +118,26 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
         link_rows=link_rows,
         alive=np.ones(k, np.int64),
         active=np.zeros(k, np.int64),
-        linked=np.zeros(1, np.int64),
+        on_mesh=np.zeros(1, np.int64),
         heard_outside=np.array([bool(set(spec.hearers) - set(own)) for spec in specs], np.int64),
         travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
         pending=np.full(k, -1, np.int64),
         arrived=np.zeros((k, len(StateMessage._fields))),
-        arrived_controls=np.zeros((k, 4)),
-        told=np.zeros(k, np.int64),
+        arrived_controls=np.zeros((k, len(ACTUATORS))),
+        command_reported=np.zeros(k, np.int64),
         states=np.zeros((k, len(StateMessage._fields))),
-        reported=np.zeros((k, 4)),
-        controls=np.zeros((k, 4)),
+        reported=np.zeros((k, len(ACTUATORS))),
+        controls=np.zeros((k, len(ACTUATORS))),
         target=np.zeros(len(AttitudeTarget._fields)),
         done=np.full(k, -1, np.int64),
-        given_up=np.zeros(1, np.int64),
+        lost=np.zeros(1, np.int64),
         unsendable=np.zeros(1, np.int64),
         complete=np.full(1, -1, np.int64),
         acknowledged=np.full(1, -1, np.int64),
         mail=np.zeros(1, np.int64),
         to_do=np.zeros(1, np.int64),
-        report_us=np.zeros(1, np.int64),
-        report_wall=np.zeros(1),
+        telemetry_us=np.zeros(1, np.int64),
+        telemetry_wall=np.zeros(1),
         attention=np.zeros(1),
         since=np.zeros(1),
         room=np.zeros(2, np.int64),

@@ -44,7 +44,7 @@ class Neighbourhood:
         self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
         self._mesh: Mesh | None = None
         if linked:
-            group.linked[0] = 1
+            group.on_mesh[0] = 1
             # A peer listens on the port of its process's first UAV; of two peers the later one connects.
             me = specs[0].uav
             connect = [setting.ports[peer].mesh for peer in sorted(linked) if peer < me]

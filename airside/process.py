@@ -1,9 +1,9 @@
 """The autopilot process: one or several autopilots of a swarm, each a tick per state that its vehicle sends.
 
 A tick, from the datagram of a state to that of the command that answers it, is compiled: `flight` lists its stages.
-Here is what happens beside the ticks: transmissions over the mesh, the recording, the ground, the launcher. In lockstep
-an autopilot waits for every record that could be usable at its tick and never runs ahead of those who hear it; on the
-wall clock it works on every state that arrives and on the newest records it has.
+This module does what happens beside the ticks: transmissions over the mesh, recording, ground, launcher. In lockstep an
+autopilot waits for every record that could be usable at its tick and never runs ahead of its receivers; on the wall
+clock it works on every state that arrives and on the newest records it has.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from functools import partial
 from types import ModuleType
 
-from ftcc.airside.autopilots import tick_of, told
+from ftcc.airside.compiled_stages import flight_of, stages_of
 from ftcc.airside.gcs import AutopilotView, GcsLink
-from ftcc.airside.group import GIVE_UP, NOTE, PUBLISH, REPORT, SECOND, WRITE, AutopilotGroup, build_group, flight_of
+from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE, AutopilotGroup, build_group
+from ftcc.airside.leader import drain_leader_events
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
@@ -32,8 +33,8 @@ __all__ = ["AutopilotProcess", "columns", "load_compiled", "main"]
 
 _ATTENTION = 0.02
 """Wall time between two looks at what the ground waits for, s."""
-_MEETING = 0.02
-"""Between two looks whether all neighbours are there, s."""
+_SUBSCRIPTIONS = 0.02
+"""Wall time between two looks whether all neighbours have subscribed, s."""
 
 
 def columns(scheme: str) -> tuple[Column, ...]:
@@ -45,7 +46,7 @@ def columns(scheme: str) -> tuple[Column, ...]:
 def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     """Fly the autopilots of this process from the launcher's go to its release."""
     process = AutopilotProcess(specs, setting, gate)
-    refusal = tick_of(specs[0].scheme).REFUSAL
+    refusal = stages_of(specs[0].scheme).REFUSAL
     try:
         if refusal and specs[0].uav == min(setting.ports):
             # One process speaks for all.
@@ -108,7 +109,7 @@ class AutopilotProcess:
         self._fly = entry_of(self.flight.fly, self.group, self.timing, setting.lockstep)
 
     def report_trouble(self, text: str) -> None:
-        """Tell that something cannot be recorded."""
+        """Log that something cannot be recorded."""
         self.gate.tell(Said("error", text))
 
     def view(self, i: int) -> AutopilotView:
@@ -129,10 +130,10 @@ class AutopilotProcess:
         )
 
     def wait_for_neighbours(self) -> None:
-        """Wait until all who hear this process's UAVs have subscribed."""
+        """Wait until all receivers of this process's records have subscribed."""
         self.stall.progress()
         while not self.neighbourhood.ready and not self.gate.stopping:
-            self.waiter.wait(_MEETING)
+            self.waiter.wait(_SUBSCRIPTIONS)
             if self.stall.long:
                 self.gate.tell(Said("warning", f"mesh: still waiting for {self.neighbourhood.awaited}"))
 
@@ -141,11 +142,11 @@ class AutopilotProcess:
         cause = ATTEND
         while cause != FLOWN:
             if cause == DATAGRAM:
-                self.take_datagram()
+                self.read_datagram()
             elif cause == MAIL:
                 self.neighbourhood.take()
             elif cause == WORK:
-                self.work()
+                self.finish_tick()
             else:
                 self.attend()
             if self.gate.stopping:
@@ -155,45 +156,45 @@ class AutopilotProcess:
 
     # What is to be done after a tick.
 
-    def work(self) -> None:
-        """Put a transmission on the mesh, write rows, tell what happened and what the ground wants to hear."""
+    def finish_tick(self) -> None:
+        """Put a transmission on the mesh, write rows, log events, send telemetry: what is due of it."""
         to_do = int(self.group.to_do[0])
         if to_do & PUBLISH:
             self.neighbourhood.publish()
-        if to_do & GIVE_UP:
-            self.give_up()
+        if to_do & LOST:
+            self.end_lost()
         if to_do & WRITE:
             self.recorder.write()
             self.link_recorder.write()
         if to_do & SECOND:
             self.recorder.write_if_due()
             self.link_recorder.write_if_due()
-        if to_do & NOTE:
-            for at_us, uav, severity, text in told(self.group.autopilots, self.specs):
+        if to_do & EVENTS:
+            for at_us, uav, severity, text in drain_leader_events(self.group.autopilots, self.specs):
                 self.gate.tell(Said(severity, text, uav, at_us))
-        if to_do & (REPORT | SECOND):
+        if to_do & (TELEMETRY | SECOND):
             # What the log has of each simulated second is sent when this process is awake anyhow.
-            self.report()
+            self.send_telemetry()
 
-    def report(self) -> None:
-        """Tell the ground what is due, and when something will be due next."""
+    def send_telemetry(self) -> None:
+        """Report to the ground what is due, and find out when something will be due next."""
         group = self.group
         for i, link in enumerate(self.gcs_links):
             if group.active[i]:
                 link.report(int(group.done[i]) * self.timing.period_us)
         flying = [link for link in self.gcs_links if link.view.alive]
-        group.report_us[0] = min((link.next_us for link in flying), default=0)
-        group.report_wall[0] = min((link.next_wall for link in flying), default=0.0)
+        group.telemetry_us[0] = min((link.next_us for link in flying), default=0)
+        group.telemetry_wall[0] = min((link.next_wall for link in flying), default=0.0)
 
-    def report_soon(self) -> None:
+    def send_telemetry_soon(self) -> None:
         """Look after the next tick what is due."""
-        self.group.report_us[0], self.group.report_wall[0] = 0, 0.0
+        self.group.telemetry_us[0], self.group.telemetry_wall[0] = 0, 0.0
 
-    def give_up(self) -> None:
-        """The law of some UAVs gave no finite command: tell their vehicles, and end them."""
+    def end_lost(self) -> None:
+        """End the UAVs whose law gave no finite command, and send their vehicles word of it."""
         if self.group.unsendable[0]:
             raise ValueError(f"UAV {self.names}: a value that was to be sent is not finite")
-        self.group.given_up[0] = 0
+        self.group.lost[0] = 0
         for i, link in enumerate(self.gcs_links):
             if not self.group.alive[i] and link.view.alive:
                 keep_sent(self.group.wire, i, self.vehicles[i].pack(ending_message()))
@@ -203,20 +204,20 @@ class AutopilotProcess:
     # What surrounds the ticks.
 
     def attend(self) -> None:
-        """What the launcher says and the ground asks, whether the swarm flies or is held."""
+        """Do what the launcher and the ground ask, whether the swarm flies or is held."""
         if self.waiter.wait(0.0):
             # What was asked may have changed what is due when; who has died is not waited for.
-            self.report_soon()
+            self.send_telemetry_soon()
             self.neighbourhood.take()
         now = time.monotonic()
         if now >= self.group.attention[0]:
             self.group.attention[0] = now + _ATTENTION
             for link in self.gcs_links:
                 link.attend()
-            self.complain()
+            self.warn_if_stalled()
 
-    def complain(self) -> None:
-        """Say for what this process waits, where it has waited for long."""
+    def warn_if_stalled(self) -> None:
+        """Log what this process waits for, where it has waited for long."""
         progress, tick = int(self.group.done.sum()), int(self.group.done.max()) + 1
         if progress != self.progress or not self.setting.lockstep or not self.gate.open(tick):
             self.progress = progress
@@ -230,8 +231,8 @@ class AutopilotProcess:
     progress = -1
     """Ticks of all at the last look."""
 
-    def take_datagram(self) -> None:
-        """Take in the datagram at hand, which only pymavlink reads."""
+    def read_datagram(self) -> None:
+        """Read the datagram at hand, which only pymavlink can."""
         wire = self.group.wire
         i = int(wire.whose[0])
         for message in split(wire, self.vehicles[i].codec):
@@ -243,14 +244,14 @@ class AutopilotProcess:
                 self.gcs_links[i].end()
             elif message.get_type() == "COMMAND_ACK":
                 self.gcs_links[i].take_vehicle_answer(message)
-                self.report_soon()
+                self.send_telemetry_soon()
 
     @property
     def names(self) -> str:
         return ", ".join(str(spec.uav) for spec in self.specs)
 
     def end(self) -> None:
-        """Nobody must wait for this process; what it has recorded is written; it goes when all have ended."""
+        """Release all who wait for this process, write what it has recorded, and wait until all have ended."""
         self.group.alive[:] = 0
         self.neighbourhood.end()
         for link in self.gcs_links:

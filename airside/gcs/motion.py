@@ -9,7 +9,7 @@ from typing import Any
 from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, Answer, degrees_of
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.model import level_deflections
-from ftcc.airside.references.profiles import climb_of_step, command_from_ground
+from ftcc.airside.references.profiles import ALTITUDE, SPEED, climb_of_step, command_from_ground
 from ftcc.link.flight_modes import HOLD
 from ftcc.link.mavlink import as_typed, dialect
 
@@ -56,7 +56,7 @@ def _impossible(view: AutopilotView, altitude: float | None, speed: float | None
     if altitude is not None:
         if not abs(altitude) < 1e5:
             return f"altitude {altitude:g} m: beyond 100 km"
-        if altitude < min(0.0, float(view.autopilots.profile_state[view.i, 1])):
+        if altitude < min(0.0, float(view.autopilots.profile_state[view.i, ALTITUDE])):
             return f"altitude {altitude:g} m above home: below the ground"
     if speed is None:
         return ""
@@ -81,11 +81,11 @@ def _cannot_be_followed(view: AutopilotView, altitude: float | None, speed: floa
         return ""
     climb, varies = flight.leader_climb, flight.leader_speed_varies
     if altitude is not None:
-        step = altitude - float(view.autopilots.profile_state[view.i, 1])
+        step = altitude - float(view.autopilots.profile_state[view.i, ALTITUDE])
         limit = profile.climb_limit if step > 0.0 else profile.sink_limit
         climb = max(climb, min(limit, climb_of_step(profile.altitude_filter, step)))
     if speed is not None:
-        varies = varies or speed != float(view.autopilots.profile_state[view.i, 3])
+        varies = varies or speed != float(view.autopilots.profile_state[view.i, SPEED])
     asked = dataclasses.replace(flight, leader_climb=climb, leader_speed_varies=varies)
     gains = view.scheme.gains_type(*view.spec.gains)
     before = {problem.text for problem in view.scheme.check(gains, flight) if problem.fatal}

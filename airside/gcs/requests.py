@@ -10,6 +10,7 @@ from ftcc.airside.gcs.commands import carry_out
 from ftcc.airside.gcs.flight_modes import set_mode
 from ftcc.airside.gcs.parameters import RefusedError
 from ftcc.airside.gcs.services import Services
+from ftcc.link.flight_modes import mode_of
 from ftcc.link.gcs_sockets import Peer
 from ftcc.link.mavlink import dialect
 

@@ -1,6 +1,6 @@
 """A whole flight in one process, tick by tick: what the processes do, in the same order, through the same functions.
 
-A template, see `link.compiled`: the free names are ``tick``, the tick of the scheme, and ``cycle``, the flight
+A template, see `link.compiled`: the free names are ``stages``, the stages of the scheme, and ``cycle``, the flight
 of the plant. `simulate.loop_of` fills them in.
 """
 
@@ -33,22 +33,22 @@ from ftcc.sim.spec import VehicleSpec
 
 __all__ = ["Recording", "World", "fly_ticks", "new_recording", "new_world"]
 
-if "tick" not in globals() or "cycle" not in globals():
+if "stages" not in globals() or "cycle" not in globals():
     raise ImportError(
         "ftcc.groundside.simulation.flight_loop is a template: use ftcc.groundside.simulation.one_process.loop_of"
     )
 
-tick: Any = globals()["tick"]
+stages: Any = globals()["stages"]
 cycle: Any = globals()["cycle"]
 
-_announce = tick.announce
-_anticipate = tick.anticipate
-_control = tick.control
-_hear = tick.hear
-_refer = tick.refer
-_sense = tick.sense
-_tell = tick.tell
-_SWEEPS = tick.SWEEPS
+_control = stages.control
+_hear = stages.hear
+_predict_shared = stages.predict_shared
+_publish = stages.publish
+_refer = stages.refer
+_sense = stages.sense
+_set_shared = stages.set_shared
+_SWEEPS = stages.SWEEPS
 _actuate = cycle.actuate
 _truth = cycle.truth
 _measure = cycle.measure
@@ -203,7 +203,7 @@ def _tick_by_wire(world, timing, n):
     if now % timing.exchange_us == 0:
         for i in range(lost.shape[0]):
             if lost[i] == 0:
-                _tell(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
+                _publish(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
 
 
 @compiled
@@ -228,8 +228,8 @@ def _ideal_tick(world, timing, n):
     for i in range(lost.shape[0]):
         if lost[i] == 0:
             if autopilots.leader[i] == 0:
-                _announce(autopilots, inbox, i)
-            _tell(autopilots, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
+                _set_shared(autopilots, inbox, i)
+            _publish(autopilots, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
     if _SWEEPS > 1:
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
@@ -295,7 +295,7 @@ def _settle(world, now, dt):
         moved = 0.0
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
-                _anticipate(autopilots, inbox, i, dt)
+                _predict_shared(autopilots, inbox, i, dt)
                 last = exchange.values[i, newest_slot(exchange, i)]
                 for m in range(last.shape[0]):
                     moved = max(moved, abs(autopilots.shared[i, m] - last[m]))

@@ -22,7 +22,8 @@ import numpy as np
 import psutil  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from ftcc.airside.autopilots import tick_of, told
+from ftcc.airside.compiled_stages import stages_of
+from ftcc.airside.leader import drain_leader_events
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.results import Run, TableWriter
 from ftcc.groundside.scenario import Mission
@@ -186,9 +187,11 @@ def _require(mission: Mission, needed: float, free: float, of: str) -> None:
 
 def loop_of(scheme: str, plant: str) -> ModuleType:
     """The flight of a scheme on a plant, see `flight_loop`: compiled, or plain Python if numba refuses the scheme."""
-    tick = tick_of(scheme)
-    loop = instantiate("ftcc.groundside.simulation.flight_loop", f"{scheme},{plant}", tick=tick, cycle=cycle_of(plant))
-    if tick.REFUSAL:
+    stages = stages_of(scheme)
+    loop = instantiate(
+        "ftcc.groundside.simulation.flight_loop", f"{scheme},{plant}", stages=stages, cycle=cycle_of(plant)
+    )
+    if stages.REFUSAL:
         uncompile([loop])
     return loop
 
@@ -226,8 +229,8 @@ def _fly(
     """Fly a mission; ``take`` is given what was recorded after every ``room`` ticks, and the last part comes back."""
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
-    if loop.tick.REFUSAL:
-        warnings.warn(loop.tick.REFUSAL, PlainPython, stacklevel=3)
+    if loop.stages.REFUSAL:
+        warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
     world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room)
     loop.fly_ticks(world, timing, mission.wire, 0, 0)
     if ready is not None:
@@ -301,7 +304,7 @@ def _happened(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float
     """What vehicles and autopilots have noted: time s, UAV, severity, text."""
     entries = [(at, mission.uavs[i], number) for at, i, _, number in drain_events(fleet.events)]
     events = [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in entries]
-    events += told(autopilots, mission.autopilots)
+    events += drain_leader_events(autopilots, mission.autopilots)
     return [(at / 1e6, uav, severity, text) for at, uav, severity, text in sorted(events)]
 
 
@@ -352,7 +355,7 @@ def _concluded(mission: Mission, folder: Path, last: float, flight: Flight) -> R
     for t, uav, severity, text in mission.events:
         if t <= last:
             events.write(t, text, uav, severity)
-    if refusal := tick_of(mission.scheme.name).REFUSAL:
+    if refusal := stages_of(mission.scheme.name).REFUSAL:
         events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():
         events.write(t, f"{AIRCRAFT_LOST}{why}", uav, "error")

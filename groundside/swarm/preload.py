@@ -21,9 +21,9 @@ os.environ["JE_ARROW_MALLOC_CONF"] = "background_thread:false"
 import numpy as np
 
 from ftcc.airside import process as autopilot_process
-from ftcc.airside.autopilots import placeholder as no_autopilot
+from ftcc.airside.compiled_stages import flight_of as flight_of_autopilots
+from ftcc.airside.compiled_stages import placeholder as no_autopilot
 from ftcc.airside.group import build_group as build_autopilots
-from ftcc.airside.group import flight_of as flight_of_autopilots
 from ftcc.link.exchange import begin, take_in
 from ftcc.link.recording import LINK_COLUMNS, PartWriter, new_rows
 from ftcc.link.timing import Timing

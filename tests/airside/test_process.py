@@ -36,7 +36,7 @@ def taken(bench: Bench) -> list[int]:
     process, ticks = bench.process, []
     while select.select([process.vehicles[0]], [], [], 0.05)[0]:
         if process.flight.listen(process.group, process.timing) == DATAGRAM:
-            process.take_datagram()
+            process.read_datagram()
         if process.group.pending[0] >= 0:
             ticks.append(int(process.group.pending[0]))
             process.group.done[0], process.group.pending[0] = process.group.pending[0], -1

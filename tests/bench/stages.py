@@ -12,8 +12,8 @@ from typing import Any
 import numba
 import numpy as np
 
+from ftcc.airside.compiled_stages import flight_of as autopilot_flight
 from ftcc.airside.group import build_group as build_autopilots
-from ftcc.airside.group import flight_of as autopilot_flight
 from ftcc.airside.process import columns as signal_columns
 from ftcc.groundside.scenario.mission import Mission
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, SIMULATOR, Endpoint
@@ -41,7 +41,7 @@ STAGES = (
     "autopilot: refer",
     "autopilot: control",
     "autopilot: write and send command",
-    "autopilot: tell neighbours in the process",
+    "autopilot: publish to neighbours in the process",
     "autopilot: record",
 )
 LAW = ("autopilot: hear", "autopilot: refer", "autopilot: control")
@@ -55,8 +55,8 @@ def _flyer(mission: Mission) -> Any:
         vehicle.bring_into_force, vehicle.transmit, vehicle.record, vehicle.fly_on, vehicle.listen,
     )  # fmt: skip
     measure = cycle_of(mission.plant).sense
-    hear_states, sense, hear, refer, control, actuate, tell, report = (
-        pilot.listen, pilot.sense, pilot.hear, pilot.refer, pilot.control, pilot.actuate, pilot.tell, pilot.report,
+    hear_states, sense, hear, refer, control, actuate, publish, report = (
+        pilot.listen, pilot.sense, pilot.hear, pilot.refer, pilot.control, pilot.actuate, pilot.publish, pilot.record,
     )  # fmt: skip
 
     @numba.njit
@@ -99,7 +99,7 @@ def _flyer(mission: Mission) -> Any:
                     elif stage == 11:
                         actuate(pilots, i, now_us)
                     elif stage == 12 and now_us % timing.exchange_us == 0:
-                        tell(pilots, timing, i, now_us)
+                        publish(pilots, timing, i, now_us)
                     elif stage == 13:
                         report(pilots, timing, i, now_us)
                 now = monotonic(room)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftcc.airside.autopilots import tick_of
+from ftcc.airside.compiled_stages import stages_of
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation.one_process import Flight, fly_in_memory, loop_of
@@ -39,6 +39,6 @@ def test_everybody_but_the_link_counts_from_the_origin() -> None:
     loop.cycle.sense(world.fleet, 0, 0, 0, 1, world.true[0], world.measured, world.state, world.controls)
     altitude = mission.vehicles[0].initial[2]
     assert world.state[9] == np.float32(-(altitude - 1000.0))
-    tick_of("containment").sense(world.autopilots, 0, world.state, world.controls, 0)
+    stages_of("containment").sense(world.autopilots, 0, world.state, world.controls, 0)
     assert -world.state[9] == pytest.approx(altitude, abs=1e-5)
     assert world.autopilots.own[0, 3] == -world.state[9]

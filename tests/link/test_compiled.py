@@ -196,7 +196,9 @@ def test_a_template_gives_instances_of_its_own(tmp_path, monkeypatch):
     assert instantiate("template_of_a_test", "half", element=square) is first, "a name stands for one instance"
 
 
-@pytest.mark.parametrize("template", ["ftcc.airside.tick", "ftcc.sim.cycle", "ftcc.groundside.simulation.flight_loop"])
+@pytest.mark.parametrize(
+    "template", ["ftcc.airside.stages", "ftcc.sim.cycle", "ftcc.groundside.simulation.flight_loop"]
+)
 def test_a_template_says_what_it_is_when_imported_plainly(template):
     with pytest.raises(ImportError, match="is a template: use"):
         __import__(template)

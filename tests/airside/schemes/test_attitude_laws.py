@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ftcc.airside.autopilots import build, tick_of
+from ftcc.airside.autopilots import build
+from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.scheme import Flight
 from ftcc.airside.schemes import find
 from ftcc.airside.schemes.attitude_synchronization import _low_passed as low_passed
@@ -37,7 +38,7 @@ class Pilot:
         self.scheme = find(scheme)
         self.period = mission.timing.period
         self.autopilots, self.inbox = build(mission.autopilots, mission.timing)
-        self.tick = tick_of(scheme)
+        self.stages = stages_of(scheme)
         self.n = 0
 
     def see(self, neighbours: float | None = None, **state: float) -> dict[str, float]:
@@ -51,7 +52,7 @@ class Pilot:
         if neighbours is not None:
             self.inbox.values[0, :, :3] = neighbours
             self.inbox.valid[0, :] = 1.0
-        assert self.tick.control(self.autopilots, self.inbox, 0, self.period)
+        assert self.stages.control(self.autopilots, self.inbox, 0, self.period)
         names = (signal.name for signal in self.scheme.signals)
         return dict(zip(names, self.autopilots.signals[0].tolist(), strict=True))
 

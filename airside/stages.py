@@ -1,17 +1,17 @@
-"""The stages of an autopilot's tick: sense, hear, refer, control, tell. A template, see `link.compiled`.
+"""What the stages of an autopilot's tick do: sense, hear, refer, control, publish. A template, see `instantiate`.
 
-The free name ``scheme`` is the module of the control law, ``references`` that of what its UAVs refer to by themselves.
-`autopilots.tick_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`: `flight`
-puts them together for the autopilot process, ``groundside.flight_loop`` for the simulation in a single process.
+The free name ``scheme`` is the module of the control law, ``references`` that of its UAVs' own references.
+`compiled_stages.stages_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`:
+`flight` calls them in their order in the autopilot process, ``flight_loop`` in the simulation in one process.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from ftcc.airside.autopilots import lead
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
+from ftcc.airside.leader import advance_leader
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import decode_command
@@ -20,10 +20,11 @@ from ftcc.link.compiled import compiled, copy, fields, store, width
 from ftcc.link.exchange import deliver_due, post
 from ftcc.link.flight_modes import HOLD
 
-__all__ = ["SWEEPS", "announce", "anticipate", "control", "hear", "refer", "sense", "tell"]
+__all__ = ["SWEEPS", "control", "hear", "predict_shared", "publish", "refer", "sense", "set_shared"]
 
+# A template has no such names until `instantiate` gives them.
 if "scheme" not in globals():
-    raise ImportError("ftcc.airside.tick is a template: use ftcc.airside.autopilots.tick_of(scheme)")
+    raise ImportError("ftcc.airside.stages is a template: use ftcc.airside.compiled_stages.stages_of(scheme)")
 
 scheme: Any = globals()["scheme"]
 references: Any = globals()["references"]
@@ -41,7 +42,7 @@ _stand = references.stand
 _COMMANDS = len(scheme.COMMANDS)
 
 REFUSAL = ""
-"""Why numba cannot compile the scheme, set by `autopilots.tick_of`; empty where it can."""
+"""Why numba cannot compile the scheme, set by `compiled_stages.stages_of`; empty where it can."""
 
 SWEEPS: int = getattr(scheme, "SWEEPS", 1)
 """Most exchanges of one instant where the exchange is ideal."""
@@ -51,16 +52,16 @@ _LARGEST = 1e30
 
 
 @compiled
-def _heard(autopilots, inbox, i):
+def _heard_by(autopilots, inbox, i):
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
     return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
 
 
 @compiled
-def _begin(autopilots, inbox, i, own, reference, gains):
+def _start_law(autopilots, inbox, i, own, reference, gains):
     if autopilots.started[i] == 0:
         model = fields(Model, autopilots.model[i])
-        store(_start(own, _heard(autopilots, inbox, i), reference, model, gains), autopilots.state[i])
+        store(_start(own, _heard_by(autopilots, inbox, i), reference, model, gains), autopilots.state[i])
         autopilots.started[i] = 1
 
 
@@ -68,13 +69,13 @@ if hasattr(scheme, "observe"):
     _observe = scheme.observe
 
     @compiled
-    def _show(autopilots, i, before, own, reference, output, gains):
+    def _set_signals(autopilots, i, before, own, reference, output, gains):
         store(_observe(before, own, reference, output, gains), autopilots.signals[i])
 
 else:
 
     @compiled
-    def _show(autopilots, i, before, own, reference, output, gains):
+    def _set_signals(autopilots, i, before, own, reference, output, gains):
         store(before, autopilots.signals[i])
         copy(autopilots.output[i, _COMMANDS:], autopilots.signals[i, _STATES:])
 
@@ -100,12 +101,13 @@ def hear(exchange, inbox, events, timing, i, now_us):
 
 @compiled
 def refer(autopilots, inbox, i, now_us, period_us):
-    """Bring what UAV ``i`` tracks to this tick, once at every tick: a leader's profile, a follower's own reference.
+    """Bring the reference of UAV ``i`` to this tick: a leader's profile, a follower's own reference.
 
-    To be called after `hear`: a profile may wait for the position of another leader. In hold it stands still.
+    To be called once at every tick, after `hear`: a profile may wait for the position of another leader. In hold
+    it stands still.
     """
     if autopilots.leader[i] == 1:
-        lead(autopilots, inbox, i, now_us, period_us)
+        advance_leader(autopilots, inbox, i, now_us, period_us)
         return
     if autopilots.mode[i] == HOLD:
         if _stand(autopilots.reference[i], period_us):
@@ -116,25 +118,25 @@ def refer(autopilots, inbox, i, now_us, period_us):
 
 
 @compiled
-def announce(autopilots, inbox, i):
-    """Set ``shared`` from the state at this instant, before the law's step (exchange in two phases)."""
+def set_shared(autopilots, inbox, i):
+    """Set ``shared`` from the state at this instant, before the law's step, for an ideal exchange."""
     own = fields(Own, autopilots.own[i])
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
-    _begin(autopilots, inbox, i, own, reference, gains)
+    _start_law(autopilots, inbox, i, own, reference, gains)
     output = fields(_Output, autopilots.output[i])
     store(_share(fields(_State, autopilots.state[i]), own, reference, output, gains), autopilots.shared[i])
 
 
 @compiled
-def anticipate(autopilots, inbox, i, dt):
+def predict_shared(autopilots, inbox, i, dt):
     """Set ``shared`` to what UAV ``i`` would share of this instant given what it has heard; no state advances."""
     own = fields(Own, autopilots.own[i])
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     model = fields(Model, autopilots.model[i])
     state = fields(_State, autopilots.state[i])
-    _, output = _step(state, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
+    _, output = _step(state, own, _heard_by(autopilots, inbox, i), reference, model, gains, dt)
     store(_share(state, own, reference, output, gains), autopilots.shared[i])
 
 
@@ -149,9 +151,9 @@ def control(autopilots, inbox, i, dt):
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     model = fields(Model, autopilots.model[i])
-    _begin(autopilots, inbox, i, own, reference, gains)
+    _start_law(autopilots, inbox, i, own, reference, gains)
     before = fields(_State, autopilots.state[i])
-    after, output = _step(before, own, _heard(autopilots, inbox, i), reference, model, gains, dt)
+    after, output = _step(before, own, _heard_by(autopilots, inbox, i), reference, model, gains, dt)
     shown = autopilots.output[i]
     store(output, shown)
     for n in range(_COMMANDS):
@@ -159,7 +161,7 @@ def control(autopilots, inbox, i, dt):
             return False
     store(after, autopilots.state[i])
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
-    _show(autopilots, i, before, own, reference, output, gains)
+    _set_signals(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
         autopilots.command[i, autopilots.actuator[n]] = shown[n]
     if autopilots.course[i] == autopilots.course[i]:
@@ -168,6 +170,6 @@ def control(autopilots, inbox, i, dt):
 
 
 @compiled
-def tell(autopilots, exchange, events, i, sequence, now_us):
-    """Say what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
+def publish(autopilots, exchange, events, i, sequence, now_us):
+    """Post what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
     post(exchange, i, sequence, now_us, events.radio_on[i], autopilots.shared[i])

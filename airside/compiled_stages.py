@@ -1,0 +1,70 @@
+"""The compiled tick of a scheme, made from the templates `stages` and `flight`; plain Python where numba refuses it."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from types import ModuleType
+
+from ftcc.airside.autopilots import build
+from ftcc.airside.model import Model
+from ftcc.airside.references import of_plant
+from ftcc.airside.schemes import find
+from ftcc.airside.spec import AutopilotSpec, OwnReference
+from ftcc.link.actuators import ACTUATORS
+from ftcc.link.channel import Channel
+from ftcc.link.compiled import instantiate, refusal, uncompile
+from ftcc.link.timing import Timing
+
+__all__ = ["flight_of", "placeholder", "stages_of"]
+
+
+@functools.cache
+def stages_of(name: str) -> ModuleType:
+    """The stages of a tick under a scheme, by its name, see `stages`.
+
+    They are compiled, or, where numba cannot compile the scheme, plain Python: then their ``REFUSAL`` says why.
+    """
+    scheme = find(name)
+    stages = instantiate("ftcc.airside.stages", name, scheme=scheme.module, references=of_plant(scheme.plant))
+    autopilots, inbox = build([placeholder(name)], Timing(1, 1, 1, 1, 1, 1, 1))
+    because = refusal(stages.control, autopilots, inbox, 0, 0.01)
+    if because:
+        stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, slowly: numba cannot compile it ({because})"
+        uncompile([stages, *_with_its_package(scheme.module)])
+    return stages
+
+
+@functools.cache
+def flight_of(name: str) -> ModuleType:
+    """The flight of autopilots under a scheme, by its name, see `flight`: compiled or not, as its stages are."""
+    stages = stages_of(name)
+    flight = instantiate("ftcc.airside.flight", name, stages=stages)
+    if stages.REFUSAL:
+        uncompile([flight])
+    return flight
+
+
+def _with_its_package(scheme: ModuleType) -> list[ModuleType]:
+    """A scheme's file, and, if it comes from another package than this one, what else of that is loaded."""
+    package, own = scheme.__name__.split(".")[0], __name__.split(".")[0]
+    if package == own:
+        return [scheme]
+    return [module for name, module in sys.modules.items() if name == package or name.startswith(f"{package}.")]
+
+
+def placeholder(name: str) -> AutopilotSpec:
+    """A follower that knows and hears nothing, to compile with."""
+    scheme = find(name)
+    return AutopilotSpec(
+        uav=1,
+        role="follower",
+        scheme=name,
+        gains=(0.0,) * len(scheme.gains_type._fields),
+        model=Model(*(0.0,) * len(Model._fields)),
+        command=(0.0,) * len(ACTUATORS),
+        travel=(0.0,) * len(ACTUATORS),
+        reference=OwnReference((0.0,) * len(of_plant(scheme.plant).Reference._fields)),
+        neighbours=(),
+        channel=Channel(),
+    )
