@@ -14,11 +14,11 @@ from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE
 from ftcc.airside.link_events import set_links
 from ftcc.link.actuators import encode_command
 from ftcc.link.attitude_target import decode_target, encode_target
-from ftcc.link.channel import report_link
+from ftcc.link.channel import LINK_REPORT, Edge, report_link
 from ftcc.link.compiled import compiled, compiled_apart, compiled_to_wait, compiled_within, copy
 from ftcc.link.exchange import append, begin
 from ftcc.link.process import RESEND
-from ftcc.link.recording import is_full
+from ftcc.link.recording import LINK_COLUMNS, is_full
 from ftcc.link.system_calls import monotonic, wait
 from ftcc.link.timing import tick_of, ticks_a_second
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, GO_ON, MAIL, WORK
@@ -45,6 +45,10 @@ stages: Any = globals()["stages"]
 _publish = stages.publish
 
 _V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
+
+_SENDER = Edge._fields.index("sender")
+_REPORT = len(LINK_COLUMNS) - len(LINK_REPORT)
+"""Where the report on a link begins in a row of its recording."""
 
 _DATAGRAMS = 64
 """Read of one vehicle at a time, at most: a flood must not hold up the others for ever."""
@@ -193,8 +197,8 @@ def record(group, timing, i, now_us):
         for edge in range(group.inbox.degree[i]):
             row = links.values[i, links.filled[i]]
             row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
-            row[2] = float(group.inbox.edges[i, edge, 0])
-            report_link(group.inbox, i, edge, row[3:])
+            row[2] = float(group.inbox.edges[i, edge, _SENDER])
+            report_link(group.inbox, i, edge, row[_REPORT:])
             links.filled[i] += 1
 
 

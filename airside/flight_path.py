@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST
 from ftcc.link.attitude_target import path_of
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, fields, store
+from ftcc.link.messages import StateMessage
 from ftcc.link.rotation import body_axes
 
 __all__ = ["Own", "decode_state"]
@@ -55,17 +57,18 @@ def decode_state(message, t, command, own):
     Parameters
     ----------
     message : (13,) float
-        ATTITUDE_QUATERNION q1..q4, rates; LOCAL_POSITION_NED x, y, z, vx, vy, vz.
+        See `StateMessage`.
     t : float
         Stamp, s.
     command : (4,) float
-        Command in force (aileron, elevator, rudder, thrust).
+        Command in force by actuator, rad and N.
     own : (18,) float
         Written.
     """
-    vx, vy, vz = message[10], message[11], message[12]
+    sent = fields(StateMessage, message)
+    vx, vy, vz = sent.vx, sent.vy, sent.vz
     speed, gamma, chi = path_of(vx, vy, vz)
-    nose, wing, belly = body_axes(message[0], message[1], message[2], message[3])
+    nose, wing, belly = body_axes(sent.q1, sent.q2, sent.q3, sent.q4)
     u = nose[0] * vx + nose[1] * vy + nose[2] * vz
     v = wing[0] * vx + wing[1] * vy + wing[2] * vz
     w = belly[0] * vx + belly[1] * vy + belly[2] * vz
@@ -77,9 +80,24 @@ def decode_state(message, t, command, own):
     side = wing[0] * east_x + wing[1] * east_y
     fall = wing[0] * down_x + wing[1] * down_y + wing[2] * down_z
     mu = math.atan2(fall, side)
-    own[0] = t
-    own[1], own[2], own[3] = message[7], message[8], -message[9]
-    own[4], own[5], own[6], own[7], own[8], own[9] = speed, gamma, chi, mu, alpha, beta
-    own[10] = math.atan2(-nose[2], math.sqrt(wing[2] * wing[2] + belly[2] * belly[2]))
-    own[11], own[12], own[13] = message[4], message[5], message[6]
-    own[14], own[15], own[16], own[17] = command[0], command[1], command[2], command[3]
+    seen = Own(
+        t=t,
+        x=sent.x,
+        y=sent.y,
+        z=-sent.z,
+        V=speed,
+        gamma=gamma,
+        chi=chi,
+        mu=mu,
+        alpha=alpha,
+        beta=beta,
+        theta=math.atan2(-nose[2], math.sqrt(wing[2] * wing[2] + belly[2] * belly[2])),
+        p=sent.rollspeed,
+        q=sent.pitchspeed,
+        r=sent.yawspeed,
+        aileron=command[AILERON],
+        elevator=command[ELEVATOR],
+        rudder=command[RUDDER],
+        thrust=command[THRUST],
+    )
+    store(seen, own)

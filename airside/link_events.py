@@ -57,7 +57,7 @@ def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
         position=np.zeros(1, np.int64),
         radio_on=np.ones(len(specs), np.int64),
     )
-    for at_us, i, edge, quality in sorted(rows, key=lambda row: row[:3]):
+    for at_us, i, edge, quality in sorted(rows, key=lambda row: row[:-1]):
         inject(events, at_us, i, edge, quality)
     return events
 

@@ -19,6 +19,7 @@ from ftcc.link.channel import hear as hear_inbox
 from ftcc.link.compiled import compiled, copy, fields, store, width
 from ftcc.link.exchange import deliver_due, post
 from ftcc.link.flight_modes import HOLD
+from ftcc.link.messages import StateMessage
 
 __all__ = ["SWEEPS", "control", "hear", "predict_shared", "publish", "refer", "sense", "set_shared"]
 
@@ -46,6 +47,8 @@ REFUSAL = ""
 
 SWEEPS: int = getattr(scheme, "SWEEPS", 1)
 """Most exchanges of one instant where the exchange is ideal."""
+
+_DOWN = StateMessage._fields.index("z")
 
 _LARGEST = 1e30
 """Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
@@ -87,7 +90,7 @@ def sense(autopilots, i, state, reported, now_us):
     ``reported`` comes as fractions of the travel and is overwritten in rad and N, the position down in ``state`` from
     the datum and is overwritten from the origin that everybody else knows.
     """
-    state[9] -= autopilots.datum[i]
+    state[_DOWN] -= autopilots.datum[i]
     decode_command(reported, autopilots.travel[i], reported)
     decode_state(state, now_us / 1e6, reported, autopilots.own[i])
 

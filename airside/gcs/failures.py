@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
@@ -29,14 +29,23 @@ _NEVER = 2**62
 _FAILED = dialect.MAV_RESULT_FAILED
 
 
+class _Awaited(NamedTuple):
+    """What the vehicle was asked, and has not answered yet."""
+
+    request: Request
+    meaning: Meaning
+    instance: int
+    until: float
+    """Wall time, s (monotonic)."""
+
+
 class Failures:
     """The failures of one UAV, on their way."""
 
     def __init__(self, view: AutopilotView, outbox: Outbox) -> None:
         self._view = view
         self._outbox = outbox
-        self._waiting: tuple[Request, Meaning, int, float] | None = None
-        """What the vehicle was asked: request, meaning, instance, and until when it may answer (wall, s)."""
+        self._waiting: _Awaited | None = None
         self._names = in_slots(self._view.scheme.commands)
         """The actuators by slot, as this kind of aircraft has them."""
         self._armed: list[tuple[int, int, str, str, str]] = []
@@ -50,7 +59,8 @@ class Failures:
 
     def inject(self, request: Request) -> Answer | None:
         """Arm a failure; None: the answer comes when the vehicle has given its own."""
-        meaning = meaning_of(*request.parameters[:3])
+        unit, kind, number, *_ = request.parameters
+        meaning = meaning_of(unit, kind, number)
         if meaning is None:
             return Answer(UNSUPPORTED)
         if not self._view.failures_enabled:
@@ -58,7 +68,7 @@ class Failures:
         at_us, why = self._view.acting_time()
         if why:
             return Answer(DENIED, why)
-        instance = int(request.parameters[2])
+        instance = int(number)
         if not meaning.unit.on_board:
             return self._fail_link(request, meaning, instance, at_us)
         if self._view.leader:
@@ -71,7 +81,7 @@ class Failures:
         sizes = [self._view.failure_sizes[size.name] for size in AIRFRAME_SIZES]
         asked = 0 if self._view.at_ms == 0 else at_us
         self._view.vehicle.send(*failure_messages(self._view.spec.uav, meaning, instance, asked, sizes))
-        self._waiting = (request, meaning, instance, time.monotonic() + _VEHICLE_TIMEOUT)
+        self._waiting = _Awaited(request, meaning, instance, time.monotonic() + _VEHICLE_TIMEOUT)
         return None
 
     def take_vehicle_answer(self, message: Any) -> None:
@@ -94,8 +104,8 @@ class Failures:
 
     def check_timeout(self) -> None:
         """Answer for a vehicle that does not."""
-        if self._waiting is not None and time.monotonic() > self._waiting[3]:
-            request = self._waiting[0]
+        if self._waiting is not None and time.monotonic() > self._waiting.until:
+            request = self._waiting.request
             self._waiting = None
             self._outbox.answer(request, Answer(_FAILED, "the vehicle does not answer"))
 

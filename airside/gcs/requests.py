@@ -17,7 +17,9 @@ from ftcc.link.mavlink import dialect
 __all__ = ["MESSAGES", "Message"]
 
 _M = dialect
-_FTP_NAK = 129
+_FTP_SEQUENCE, _FTP_SESSION, _FTP_OPCODE, _FTP_SIZE, _FTP_REQUEST, _FTP_DATA = 0, 2, 3, 4, 5, 12
+"""Where the fields of its payload begin."""
+_FTP_ANSWER, _FTP_NAK = 128, 129
 _FTP_END_OF_FILE, _FTP_UNKNOWN_COMMAND, _FTP_NOT_FOUND = 6, 7, 10
 _FTP_ERRORS = {3: _FTP_END_OF_FILE, 4: _FTP_NOT_FOUND, 14: _FTP_NOT_FOUND, 15: _FTP_NOT_FOUND}
 """By request: a folder is listed to its end, a file to be read is not found; all others are unknown."""
@@ -124,13 +126,15 @@ def _ping(services: Services, peer: Peer, message: Any) -> None:
 def _files(services: Services, peer: Peer, message: Any) -> None:
     """MAVLink FTP of a vehicle without files; answers to somebody else's questions are left alone."""
     payload = list(message.payload)
-    if payload[3] >= 128:
+    asked = payload[_FTP_OPCODE]
+    if asked >= _FTP_ANSWER:
         return
     answer = [0] * 251
-    sequence = (payload[0] | payload[1] << 8) + 1
-    answer[0], answer[1], answer[2] = sequence & 0xFF, sequence >> 8 & 0xFF, payload[2]
-    answer[3], answer[4], answer[5] = _FTP_NAK, 1, payload[3]
-    answer[12] = _FTP_ERRORS.get(payload[3], _FTP_UNKNOWN_COMMAND)
+    sequence = (payload[_FTP_SEQUENCE] | payload[_FTP_SEQUENCE + 1] << 8) + 1
+    answer[_FTP_SEQUENCE], answer[_FTP_SEQUENCE + 1] = sequence & 0xFF, sequence >> 8 & 0xFF
+    answer[_FTP_SESSION] = payload[_FTP_SESSION]
+    answer[_FTP_OPCODE], answer[_FTP_SIZE], answer[_FTP_REQUEST] = _FTP_NAK, 1, asked
+    answer[_FTP_DATA] = _FTP_ERRORS.get(asked, _FTP_UNKNOWN_COMMAND)
     peer.send(_M.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), answer))
 
 

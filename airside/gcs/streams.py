@@ -9,10 +9,13 @@ from typing import Any, NamedTuple
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
 from ftcc.airside.gcs.autopilot_view import AutopilotView
+from ftcc.airside.references.attitude import Reference as AttitudeReference
 from ftcc.link.actuators import THRUST
+from ftcc.link.channel import Channel, Edge
 from ftcc.link.compiled import fields
 from ftcc.link.flight_modes import custom_mode
 from ftcc.link.mavlink import dialect, float_array
+from ftcc.link.messages import StateMessage
 from ftcc.link.rotation import body_attitude
 
 __all__ = [
@@ -31,6 +34,9 @@ LINK_FIELDS = ("sender", "age", "received", "lost", "cut")
 """Numbers per in-edge in the DEBUG_FLOAT_ARRAY "links"; age -1 = never heard."""
 
 _M = dialect
+_RATES, _POSITION = (StateMessage._fields.index(name) for name in ("rollspeed", "x"))
+_RECEIVED, _LOST = (Edge._fields.index(name) for name in ("received", "lost"))
+_BLOCKED = Channel._fields.index("blocked")
 
 
 def heartbeat(view: AutopilotView, alive: bool = True) -> Any:
@@ -53,7 +59,7 @@ def _stamp(view: AutopilotView) -> int:
 
 
 def _attitude(view: AutopilotView) -> Any:
-    q0, q1, q2, q3, p, q, r = view.state[:7].tolist()
+    q0, q1, q2, q3, p, q, r = view.state[:_POSITION].tolist()
     roll = math.atan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q0 * q2 - q3 * q1))))
     return _M.MAVLink_attitude_message(_stamp(view), roll, pitch, _yaw(q0, q1, q2, q3), p, q, r)
@@ -64,20 +70,20 @@ def _yaw(q0: float, q1: float, q2: float, q3: float) -> float:
 
 
 def _attitude_quaternion(view: AutopilotView) -> Any:
-    return _M.MAVLink_attitude_quaternion_message(_stamp(view), *view.state[:7].tolist())
+    return _M.MAVLink_attitude_quaternion_message(_stamp(view), *view.state[:_POSITION].tolist())
 
 
 def _local_position(view: AutopilotView) -> Any:
-    return _M.MAVLink_local_position_ned_message(_stamp(view), *view.state[7:].tolist())
+    return _M.MAVLink_local_position_ned_message(_stamp(view), *view.state[_POSITION:].tolist())
 
 
 def _heading(view: AutopilotView) -> float:
     """Degrees, 0..360."""
-    return math.degrees(_yaw(*view.state[:4].tolist())) % 360.0
+    return math.degrees(_yaw(*view.state[:_RATES].tolist())) % 360.0
 
 
 def _global_position(view: AutopilotView) -> Any:
-    x, y, z, vx, vy, vz = view.state[7:].tolist()
+    x, y, z, vx, vy, vz = view.state[_POSITION:].tolist()
     latitude, longitude = view.home.place(x, y)
     return _M.MAVLink_global_position_int_message(
         _stamp(view),
@@ -93,7 +99,7 @@ def _global_position(view: AutopilotView) -> Any:
 
 
 def _gps_raw(view: AutopilotView) -> Any:
-    x, y, z, vx, vy, vz = view.state[7:].tolist()
+    x, y, z, vx, vy, vz = view.state[_POSITION:].tolist()
     latitude, longitude = view.home.place(x, y)
     course = math.degrees(math.atan2(vy, vx)) % 360.0
     return _M.MAVLink_gps_raw_int_message(
@@ -111,7 +117,7 @@ def _gps_raw(view: AutopilotView) -> Any:
 
 
 def _vfr_hud(view: AutopilotView) -> Any:
-    _, _, z, vx, vy, vz = view.state[7:].tolist()
+    _, _, z, vx, vy, vz = view.state[_POSITION:].tolist()
     ground = math.sqrt(vx * vx + vy * vy)
     throttle = whole(100.0 * float(view.controls[THRUST]), 16, signed=False)
     altitude = view.home.altitude - z
@@ -135,8 +141,8 @@ _SENSORS = (
 
 
 def _sys_status(view: AutopilotView) -> Any:
-    lost = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], 5].sum())
-    received = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], 4].sum())
+    lost = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], _LOST].sum())
+    received = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], _RECEIVED].sum())
     share = round(1e4 * lost / max(1, lost + received))
     # No battery is modelled: unknown voltage and current, 100 % so that no client raises an alarm.
     # There is no fence; one that does not count as healthy is announced as breached.
@@ -184,10 +190,16 @@ def _signal(view: AutopilotView, *names: str) -> float | None:
 def _attitude_target(view: AutopilotView) -> Any:
     own = fields(Own, view.autopilots.own[view.i])
     if view.scheme.plant == "attitude" and not view.leader:
-        mu, alpha, beta = view.autopilots.reference[view.i, :3].tolist()
+        wanted = fields(AttitudeReference, view.autopilots.reference[view.i])
         rates = 0b111
         return _M.MAVLink_attitude_target_message(
-            _stamp(view), rates, body_attitude(own.chi, own.gamma, mu, alpha, beta), 0.0, 0.0, 0.0, 0.0
+            _stamp(view),
+            rates,
+            body_attitude(own.chi, own.gamma, wanted.mu, wanted.alpha, wanted.beta),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
         )
     pitch = own.theta if view.leader else _signal(view, "theta_d")
     rate = 0.0 if view.leader else _signal(view, "q_d")
@@ -234,10 +246,10 @@ def _links(view: AutopilotView) -> Any:
     inbox, i = view.inbox, view.i
     values: list[float] = []
     for edge in range(int(inbox.degree[i])):
-        sender, _, _, _, received, lost, _ = inbox.edges[i, edge].tolist()
-        cut = inbox.quality[i, edge, 6] > 0.0 or not view.link_events.radio_on[i]
+        at = fields(Edge, inbox.edges[i, edge])
+        cut = inbox.quality[i, edge, _BLOCKED] > 0.0 or not view.link_events.radio_on[i]
         age = float(inbox.age[i, edge]) if inbox.valid[i, edge] else -1.0
-        values += [sender, age, received, lost, float(cut)]
+        values += [at.sender, age, at.received, at.lost, float(cut)]
     return float_array(view.now_us, "links", values)
 
 

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.flight_path import Own, decode_state
+from ftcc.link.actuators import ACTUATORS
 from ftcc.link.compiled import compiled, fields
 from ftcc.link.mavlink import dialect
+from ftcc.link.messages import StateMessage
 
 __all__ = ["Command", "Filter", "Reference", "command_from_ground", "refer", "stand"]
 
@@ -30,6 +32,9 @@ class Reference(NamedTuple):
     """rad/s."""
     beta_dot: float
     """rad/s."""
+
+
+_RATE = Reference._fields.index("mu_dot")
 
 
 class Filter(NamedTuple):
@@ -69,15 +74,17 @@ def refer(parameters, commands, reference, now_us, period_us):
                 latest = n
         for axis in range(3):
             error = commands[latest, 1 + axis] - reference[axis]
-            reference[3 + axis] += h * a.frequency * (a.frequency * error - 2.0 * a.damping * reference[3 + axis])
-            reference[axis] += h * reference[3 + axis]
+            reference[_RATE + axis] += (
+                h * a.frequency * (a.frequency * error - 2.0 * a.damping * reference[_RATE + axis])
+            )
+            reference[axis] += h * reference[_RATE + axis]
 
 
 @compiled
 def stand(reference, period_us):
     """Hold: keep the attitude; the commands wait."""
     for axis in range(3):
-        reference[3 + axis] = 0.0
+        reference[_RATE + axis] = 0.0
     return True
 
 
@@ -97,7 +104,7 @@ _RATES = (
 def command_from_ground(message: Any, own: NDArray[np.float64], now_us: int) -> tuple[Command | None, str]:
     """What a SET_ATTITUDE_TARGET asks for, by the flight path of ``own``; or None and why it is refused.
 
-    Of thrust no notice is taken: the laws leave it alone, and no client can leave it out. Rates are refused: the filter
+    Its thrust is ignored: the laws leave thrust alone, and no client can leave it out. Rates are refused: the filter
     makes them.
     """
     if message.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE:
@@ -110,13 +117,13 @@ def command_from_ground(message: Any, own: NDArray[np.float64], now_us: int) -> 
     if not abs(length - 1.0) < _UNIT:  # also where it is not a number
         return None, "attitude target: no unit quaternion"
     path = Own(*own.tolist())
-    state = np.zeros(13)
-    state[:4] = [value / length for value in q]
-    state[10] = math.cos(path.gamma) * math.cos(path.chi)
-    state[11] = math.cos(path.gamma) * math.sin(path.chi)
-    state[12] = -math.sin(path.gamma)
+    state = dict.fromkeys(StateMessage._fields, 0.0)
+    state |= zip(("q1", "q2", "q3", "q4"), (value / length for value in q), strict=True)
+    state["vx"] = math.cos(path.gamma) * math.cos(path.chi)
+    state["vy"] = math.cos(path.gamma) * math.sin(path.chi)
+    state["vz"] = -math.sin(path.gamma)
     seen = np.zeros(len(Own._fields))
-    decode_state(state, 0.0, np.zeros(4), seen)
+    decode_state(np.array(list(state.values())), 0.0, np.zeros(len(ACTUATORS)), seen)
     wanted = Own(*seen.tolist())
     if abs(wanted.mu) > _BANK or not _ALPHA[0] <= wanted.alpha <= _ALPHA[1] or abs(wanted.beta) > _BETA:
         shown = [round(math.degrees(angle)) for angle in (wanted.mu, wanted.alpha, wanted.beta)]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.elements.filters import reference_shaper
 from ftcc.airside.scheme import Quantity
-from ftcc.link.compiled import compiled, fields
+from ftcc.link.compiled import compiled, fields, store
 
 __all__ = [
     "Command",
@@ -91,6 +91,13 @@ class Command(NamedTuple):
     drift_east: float
 
 
+_AT, _NORTH, _EAST, _DRIFT_NORTH, _DRIFT_EAST = range(len(Command._fields))
+_X, _X_DOT, _X_DDOT, _CENTRE, _CENTRE_DOT, _CENTRE_DDOT = (
+    Reference._fields.index(name) for name in ("x", "x_dot", "x_ddot", "north", "north_dot", "north_ddot")
+)
+"""The first of three axes, or, of the centre, of two."""
+
+
 @compiled
 def in_force(commands, t):
     """The latest row of ``commands`` (n, 5) whose time has come, before the first one the first."""
@@ -104,7 +111,8 @@ def in_force(commands, t):
 @compiled
 def centre(command, t):
     """North and east (m) of the fire's centre at ``t`` (s) under a row of commands."""
-    return command[1] + command[3] * (t - command[0]), command[2] + command[4] * (t - command[0])
+    since = t - command[_AT]
+    return command[_NORTH] + command[_DRIFT_NORTH] * since, command[_EAST] + command[_DRIFT_EAST] * since
 
 
 def moved(
@@ -112,7 +120,7 @@ def moved(
 ) -> Command:
     """The command after ``command``: from ``at`` on another centre (m), another drift (m/s), or both."""
     north, east = centre_at if centre_at is not None else centre(command, at)
-    return Command(at, north, east, *(drift if drift is not None else command[3:]))
+    return Command(at, north, east, *(drift if drift is not None else (command.drift_north, command.drift_east)))
 
 
 def newest(commands: NDArray[np.float64]) -> Command:
@@ -154,12 +162,12 @@ def _follow(reference, command, t, fire, h):
     # The shaper slows down over the distance that its acceleration allows.
     w = 2.0 * fire.shift_acceleration / fire.shift_speed
     for axis in range(2):
-        z, v, a = reference[9 + axis], reference[11 + axis], reference[13 + axis]
-        target, rate = (north, command[3]) if axis == 0 else (east, command[4])
+        z, v, a = reference[_CENTRE + axis], reference[_CENTRE_DOT + axis], reference[_CENTRE_DDOT + axis]
+        target, rate = (north, command[_DRIFT_NORTH]) if axis == 0 else (east, command[_DRIFT_EAST])
         v_rate, a_rate, jerk = reference_shaper(z, v, a, target, rate, w, fire.shift_speed, fire.shift_acceleration)
-        reference[9 + axis] = z + h * v_rate
-        reference[11 + axis] = v + h * a_rate
-        reference[13 + axis] = a + h * jerk
+        reference[_CENTRE + axis] = z + h * v_rate
+        reference[_CENTRE_DOT + axis] = v + h * a_rate
+        reference[_CENTRE_DDOT + axis] = a + h * jerk
 
 
 @compiled
@@ -169,15 +177,25 @@ def _place(reference, t, fire):
     s = fire.age + t
     theta = omega * t + fire.phase
     cosine, sine = math.cos(theta), math.sin(theta)
-    reference[0] = reference[9] + a * s * cosine + fire.safe_north
-    reference[1] = reference[10] + b * s * sine + fire.safe_east
-    reference[2] = fire.altitude
-    reference[3] = reference[11] + a * cosine - a * s * omega * sine
-    reference[4] = reference[12] + b * sine + b * s * omega * cosine
-    reference[5] = 0.0
-    reference[6] = reference[13] - 2.0 * a * omega * sine - a * s * omega * omega * cosine
-    reference[7] = reference[14] + 2.0 * b * omega * cosine - b * s * omega * omega * sine
-    reference[8] = 0.0
+    formation = fields(Reference, reference)
+    post = Reference(
+        x=formation.north + a * s * cosine + fire.safe_north,
+        y=formation.east + b * s * sine + fire.safe_east,
+        z=fire.altitude,
+        x_dot=formation.north_dot + a * cosine - a * s * omega * sine,
+        y_dot=formation.east_dot + b * sine + b * s * omega * cosine,
+        z_dot=0.0,
+        x_ddot=formation.north_ddot - 2.0 * a * omega * sine - a * s * omega * omega * cosine,
+        y_ddot=formation.east_ddot + 2.0 * b * omega * cosine - b * s * omega * omega * sine,
+        z_ddot=0.0,
+        north=formation.north,
+        east=formation.east,
+        north_dot=formation.north_dot,
+        east_dot=formation.east_dot,
+        north_ddot=formation.north_ddot,
+        east_ddot=formation.east_ddot,
+    )
+    store(post, reference)
 
 
 @compiled
@@ -187,9 +205,9 @@ def refer(parameters, commands, reference, now_us, period_us):
     now = now_us / 1e6
     latest = in_force(commands, now)
     if latest == 0:
-        reference[9], reference[10] = centre(commands[0], now)
-        reference[11], reference[12] = commands[0, 3], commands[0, 4]
-        reference[13], reference[14] = 0.0, 0.0
+        reference[_CENTRE], reference[_CENTRE + 1] = centre(commands[0], now)
+        reference[_CENTRE_DOT], reference[_CENTRE_DOT + 1] = commands[0, _DRIFT_NORTH], commands[0, _DRIFT_EAST]
+        reference[_CENTRE_DDOT], reference[_CENTRE_DDOT + 1] = 0.0, 0.0
     elif now_us > 0:
         before = (now_us - period_us) / 1e6
         _follow(reference, commands[in_force(commands, before)], before, fire, period_us / 1e6)
@@ -200,8 +218,8 @@ def refer(parameters, commands, reference, now_us, period_us):
 def stand(reference, period_us):
     """Hold: straight on, at the present velocity."""
     for axis in range(3):
-        reference[axis] += reference[3 + axis] * period_us / 1e6
-        reference[6 + axis] = 0.0
+        reference[_X + axis] += reference[_X_DOT + axis] * period_us / 1e6
+        reference[_X_DDOT + axis] = 0.0
     return False  # the fire burns on meanwhile
 
 

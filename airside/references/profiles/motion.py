@@ -55,8 +55,9 @@ def command_in_force(commands, triggers, state, time):
 
 @compiled
 def _filtered(phi, value, rate, target):
+    a, b, c, d = phi
     offset = value - target
-    return target + phi[0] * offset + phi[1] * rate, phi[2] * offset + phi[3] * rate
+    return target + a * offset + b * rate, c * offset + d * rate
 
 
 @compiled
