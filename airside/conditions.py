@@ -11,7 +11,7 @@ __all__ = ["above_leaders_climb", "bounds_errors", "largest_degree", "stable_in_
 
 
 def largest_degree(flight: Flight) -> float:
-    """Largest sum of weights with which a follower hears."""
+    """Largest sum of a follower's in-weights."""
     graph = flight.graph
     return max(sum(graph.weights.get((i, j), 0.0) for j in graph.uavs) for i in graph.followers)
 

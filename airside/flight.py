@@ -55,7 +55,7 @@ _DATAGRAMS = 64
 _LOOK = 20
 """Longest wait before the clock is looked at, ms."""
 _AHEAD = 4
-"""Lockstep: records that a sender may be ahead of the acknowledgement of those who hear it, beyond the latency."""
+"""Lockstep: exchanges that a sender may be ahead of its receivers' acknowledgements, beyond the latency."""
 
 
 @compiled_apart
@@ -85,7 +85,7 @@ def tick(group, timing, now_us):
     for i in every:
         if group.active[i] == 1:
             sense(group, i, now_us)
-    set_links(group.events, group.inbox, now_us)
+    set_links(group.link_events, group.inbox, now_us)
     for i in every:
         if group.active[i] == 1:
             hear(group, timing, i, now_us)
@@ -121,7 +121,7 @@ def sense(group, i, now_us):
 @compiled_within
 def hear(group, timing, i, now_us):
     """Take the records that are due through the channel into the inbox."""
-    _hear(group.exchange, group.inbox, group.events, timing, i, now_us)
+    _hear(group.exchange, group.inbox, group.link_events, timing, i, now_us)
 
 
 @compiled_within
@@ -176,9 +176,9 @@ def actuate(group, i, now_us):
 def publish(group, timing, i, now_us):
     """Post a record to the out-neighbours in this process, and put it into the next transmission for the others."""
     sequence = now_us // timing.exchange_us
-    _publish(group.autopilots, group.exchange, group.events, i, sequence, now_us)
+    _publish(group.autopilots, group.exchange, group.link_events, i, sequence, now_us)
     if group.heard_outside[i] == 1:
-        uav, radio_on = group.wire.system[i], group.events.radio_on[i]
+        uav, radio_on = group.wire.system[i], group.link_events.radio_on[i]
         if not append(group.transmission, uav, sequence, now_us, radio_on, group.autopilots.shared[i]):
             group.unsendable[0] = 1
 
@@ -264,8 +264,8 @@ def ask_again(group, now):
 
 
 @compiled_within
-def records_are_here(group, timing, now_us):
-    """Lockstep: whether every record that could be usable is here, and nobody who hears this process is far behind."""
+def records_are_complete(group, timing, now_us):
+    """Lockstep: whether every record that could be usable has come, and no receiver is far behind."""
     due = now_us - timing.latency_us
     if due >= 0 and group.complete[0] < due // timing.exchange_us:
         return False
@@ -305,7 +305,7 @@ def is_over(group, timing):
 
 @compiled_within
 def _fly_tick(group, timing, n):
-    """Fly tick ``n`` of those whose state of it is here; whether Python has something to do then."""
+    """Fly tick ``n`` of those whose state of it has come; whether Python has something to do then."""
     for i in range(group.alive.shape[0]):
         group.active[i] = 1 if group.alive[i] == 1 and group.pending[i] == n else 0
     tick(group, timing, n * timing.period_us)
@@ -332,7 +332,7 @@ def fly(group, timing, lockstep):
             return ATTEND
         n = _next_state(group)
         ready = n >= 0 and not (lockstep and _missing_states(group) > 0)
-        records = not lockstep or (ready and records_are_here(group, timing, n * timing.period_us))
+        records = not lockstep or (ready and records_are_complete(group, timing, n * timing.period_us))
         if group.mail[0] == 1 and ready and not (lockstep and records):
             return MAIL
         if ready and records:

@@ -33,7 +33,7 @@ class AutopilotGroup(NamedTuple):
 
     autopilots: Autopilots
     inbox: Inbox
-    events: LinkEvents
+    link_events: LinkEvents
     exchange: Exchange
     transmission: Transmission
     """What goes to other processes after an exchange."""
@@ -75,7 +75,7 @@ class AutopilotGroup(NamedTuple):
     unsendable: NDArray[np.int64]
     """(1,): 1 where something that was to be sent is not finite."""
     complete: NDArray[np.int64]
-    """(1,): lockstep: all transmissions of other processes up to this number are here."""
+    """(1,): lockstep: all transmissions of other processes up to this number have been received."""
     acknowledged: NDArray[np.int64]
     """(1,): lockstep: all receivers of this process have its transmissions up to this number."""
     mail: NDArray[np.int64]
@@ -110,7 +110,7 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
     return AutopilotGroup(
         autopilots=autopilots,
         inbox=inbox,
-        events=link_events(specs),
+        link_events=link_events(specs),
         exchange=new_exchange(own, senders, inbox.valid.shape[1], values),
         transmission=new_transmission(k, values),
         wire=new_wire(own, AUTOPILOT),
@@ -119,7 +119,7 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
         alive=np.ones(k, np.int64),
         active=np.zeros(k, np.int64),
         on_mesh=np.zeros(1, np.int64),
-        heard_outside=np.array([bool(set(spec.hearers) - set(own)) for spec in specs], np.int64),
+        heard_outside=np.array([bool(set(spec.receivers) - set(own)) for spec in specs], np.int64),
         travels_by=np.array([_travels_by(spec) for spec in specs], np.int64),
         pending=np.full(k, -1, np.int64),
         arrived=np.zeros((k, len(StateMessage._fields))),

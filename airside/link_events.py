@@ -1,4 +1,4 @@
-"""Changes of the radio links in simulated time: those of the scenario, and those that the ground asks for."""
+"""Changes of the radio links in simulated time: those of the scenario, and those that a ground station injects."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def link_events(specs: Sequence[AutopilotSpec]) -> LinkEvents:
 def inject(events: LinkEvents, at_us: int, uav: int, edge: int, quality: Sequence[float]) -> bool:
     """From ``at_us`` on in-edge ``edge`` of UAV ``uav`` (indices) has this quality; nan leaves a value as it is.
 
-    A change that acts later at the same instant wins. The same change asked for twice is one. Returns False where
+    A change that acts later at the same instant wins. The same change injected twice is one. Returns False where
     there is no room left.
     """
     begin = int(events.position[0])

@@ -1,7 +1,7 @@
 """The records that the UAVs of a process exchange with those of other processes, over the mesh.
 
-In lockstep it also keeps for whom the process waits, and how far it may run ahead of those who hear it:
-acknowledgements travel with the hearers' own transmissions.
+In lockstep this also decides what a tick must wait for, and how far the process may run ahead of its receivers: their
+acknowledgements travel with their own transmissions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ftcc.link.process import Setting
 __all__ = ["Neighbourhood"]
 
 _EVERYTHING = 2**31 - 1
-"""Number of the transmission that somebody has of whom nothing more will come, or is wanted."""
+"""Number that stands for all transmissions, past and to come: of a process that has ended."""
 _MOST_RECORDS = 256
 """In a transmission."""
 
@@ -35,12 +35,12 @@ class Neighbourhood:
         self._bad = 0
         own = {spec.uav for spec in specs}
         senders = {setting.peer_of[n.uav] for spec in specs for n in spec.neighbours if n.uav not in own}
-        hearers = {setting.peer_of[uav] for spec in specs for uav in spec.hearers if uav not in own}
-        linked = senders | hearers
+        receivers = {setting.peer_of[uav] for spec in specs for uav in spec.receivers if uav not in own}
+        linked = senders | receivers
         self._newest = dict.fromkeys(senders, -1)
-        """Number of the last transmission of each process that is heard."""
-        self._acknowledged = dict.fromkeys(hearers, -1)
-        """Number up to which each hearing process has this one's."""
+        """Number of the last transmission of each sending process."""
+        self._acknowledged = dict.fromkeys(receivers, -1)
+        """Number up to which each receiving process has this one's."""
         self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
         self._mesh: Mesh | None = None
         if linked:
@@ -50,8 +50,8 @@ class Neighbourhood:
             connect = [setting.ports[peer].mesh for peer in sorted(linked) if peer < me]
             listen = setting.ports[me].mesh if any(peer > me for peer in linked) else None
             # In lockstep an edge is subscribed to at both ends, for the acknowledgements.
-            hears, heard_by = (linked, linked) if setting.lockstep else (senders, hearers)
-            self._mesh = Mesh(setting.swarm, me, hears, heard_by, listen, connect, setting.lockstep)
+            sources, targets = (linked, linked) if setting.lockstep else (senders, receivers)
+            self._mesh = Mesh(setting.swarm, me, sources, targets, listen, connect, setting.lockstep)
         self._count()
 
     def fileno(self) -> int:
@@ -65,44 +65,44 @@ class Neighbourhood:
 
     @property
     def ready(self) -> bool:
-        """Whether all who hear this process have subscribed."""
+        """Whether all receivers have subscribed."""
         return self._mesh is None or self._mesh.ready
 
     @property
     def awaited(self) -> str:
-        """Whose subscription is still awaited, as text."""
+        """Processes that have not subscribed yet, as text."""
         return ", ".join(self._mesh.awaited) if self._mesh else ""
 
     def publish(self) -> None:
-        """Put what the group has to say to other processes on the mesh."""
+        """Put the group's transmission on the mesh."""
         if self._mesh:
             self._mesh.publish(octets_of(self._group.transmission))
         self._group.transmission.used[0] = 0
 
     def end(self) -> None:
-        """Say that nothing more will come: nobody must wait for this process."""
+        """Send a last transmission, after which nobody waits for this process."""
         transmission = self._group.transmission
         begin(transmission, _EVERYTHING, _EVERYTHING, 1, self._group.autopilots.shared.shape[1])
         self.publish()
 
-    def take(self) -> None:
-        """Take in what the mesh has brought; what is no transmission is counted and reported once."""
+    def receive(self) -> None:
+        """Read what the mesh has brought; what is no transmission is counted, and the first logged."""
         if self._mesh:
             for sender, payload in self._mesh.receive():
-                self._take_in(sender, payload)
+                self._read(sender, payload)
         self._count()
 
-    def _take_in(self, sender: int, payload: bytes) -> None:
+    def _read(self, sender: int, payload: bytes) -> None:
         incoming = self._incoming
         words, rest = divmod(len(payload), 8)
         if rest or words > len(incoming.words):
-            self._complain(f"{len(payload)} bytes are no transmission")
+            self._warn_once(f"{len(payload)} bytes are no transmission")
             return
         incoming.words[:words] = np.frombuffer(payload, "<i8")
         incoming.used[0] = words
         problem = take_in(incoming, self._group.exchange)
         if problem:
-            self._complain(problem_text(problem, incoming))
+            self._warn_once(problem_text(problem, incoming))
             return
         header = Header(*incoming.words[: len(Header._fields)].tolist())
         if sender in self._newest:
@@ -110,13 +110,13 @@ class Neighbourhood:
         if sender in self._acknowledged:
             self._acknowledged[sender] = header.heard
 
-    def _complain(self, text: str) -> None:
+    def _warn_once(self, text: str) -> None:
         self._bad += 1
         if self._bad == 1:
             self._gate.tell(Said("warning", f"mesh: {text}"))
 
     def _count(self) -> None:
-        """Tell the compiled flight up to which number everything is here and acknowledged, but for who has died."""
+        """Set up to which number everything is received and acknowledged; processes that have died do not count."""
         gone = {self._peer_of[uav] for uav in self._gate.gone}
         newest = [number for peer, number in self._newest.items() if peer not in gone]
         acknowledged = [number for peer, number in self._acknowledged.items() if peer not in gone]
@@ -124,7 +124,7 @@ class Neighbourhood:
         self._group.acknowledged[0] = min(acknowledged, default=_EVERYTHING)
 
     def missing(self) -> str:
-        """Whose transmissions or acknowledgements are the oldest, as text."""
+        """The processes whose last transmission or acknowledgement is the oldest, as text."""
         oldest = sorted((number, peer) for peer, number in {**self._acknowledged, **self._newest}.items())
         return ", ".join(f"UAV {peer}" for number, peer in oldest if number == oldest[0][0])
 

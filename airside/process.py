@@ -49,7 +49,7 @@ def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     refusal = stages_of(specs[0].scheme).REFUSAL
     try:
         if refusal and specs[0].uav == min(setting.ports):
-            # One process speaks for all.
+            # One process reports it for all.
             gate.tell(Said("warning", refusal))
         process.wait_for_neighbours()
         gate.tell(Ready())
@@ -121,7 +121,7 @@ class AutopilotProcess:
             scheme=find(self.specs[i].scheme),
             autopilots=self.group.autopilots,
             inbox=self.group.inbox,
-            link_events=self.group.events,
+            link_events=self.group.link_events,
             state=self.group.states[i],
             controls=self.group.controls[i],
             vehicle=self.vehicles[i],
@@ -144,7 +144,7 @@ class AutopilotProcess:
             if cause == DATAGRAM:
                 self.read_datagram()
             elif cause == MAIL:
-                self.neighbourhood.take()
+                self.neighbourhood.receive()
             elif cause == WORK:
                 self.finish_tick()
             else:
@@ -206,9 +206,9 @@ class AutopilotProcess:
     def attend(self) -> None:
         """Do what the launcher and the ground ask, whether the swarm flies or is held."""
         if self.waiter.wait(0.0):
-            # What was asked may have changed what is due when; who has died is not waited for.
+            # A request may have changed what is due when; a process that has died is not waited for.
             self.send_telemetry_soon()
-            self.neighbourhood.take()
+            self.neighbourhood.receive()
         now = time.monotonic()
         if now >= self.group.attention[0]:
             self.group.attention[0] = now + _ATTENTION

@@ -1,8 +1,8 @@
-"""What an autopilot process is told at its start: plain, frozen, checked before."""
+"""The specification of an autopilot, which its process gets at its start: plain, frozen, checked before."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
@@ -15,12 +15,12 @@ __all__ = ["AutopilotSpec", "LinkEvent", "Neighbour", "OwnReference"]
 
 @dataclass(frozen=True)
 class Neighbour:
-    """An in-edge of the graph: whom this UAV hears."""
+    """An in-edge of the graph: an in-neighbour of this UAV."""
 
     uav: int
     weight: float
     briefing: tuple[float, ...] = ()
-    """What is known before the first record: its shared values at t = 0; empty: nothing."""
+    """Its shared values at t = 0, where they are known before its first record; else empty."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LinkEvent:
 
 @dataclass(frozen=True)
 class OwnReference:
-    """What a UAV refers to by itself; what the numbers mean says the module of its plant in `references`."""
+    """A UAV's own reference; the module of its plant in `references` defines what the numbers mean."""
 
     initial: tuple[float, ...]
     """The ``Reference`` at t = 0."""
@@ -57,11 +57,10 @@ class AutopilotSpec:
     """In the order of the scheme's ``Gains``."""
     model: Model
     command: tuple[float, ...]
-    """What the actuators that nobody commands are told (rad, N), by slot."""
+    """Command at the start (rad, N), by slot; it stays in force for actuators that the law does not command."""
     travel: tuple[float, ...]
     """Full deflection of each actuator (rad, N), by which commands are divided on the wire."""
     reference: OwnReference
-    """What this UAV refers to without being told by others."""
     neighbours: tuple[Neighbour, ...]
     channel: Channel
     """Quality of every in-edge at the start."""
@@ -77,12 +76,12 @@ class AutopilotSpec:
     """Course that `lateral_hold` keeps for a law that commands no aileron and rudder, rad; None: there is none."""
     attitude_code: AttitudeCode = UNCODED
     """Whether and how commands travel as attitude targets."""
-    hearers: tuple[int, ...] = field(default=())
-    """Ids of those who hear this UAV."""
+    receivers: tuple[int, ...] = ()
+    """Ids of its out-neighbours."""
     tolerant_gains: tuple[float, ...] = ()
     """The same with fault tolerance on, where ``gains`` has it off."""
     flight: Flight | None = None
-    """What the scheme's conditions on gains are checked against, also in flight; None: they are not."""
+    """What the scheme's conditions on gains are checked against, also in flight; None: no check."""
 
     def edge_from(self, sender: int) -> int:
         """Index of the in-edge from a neighbour.
@@ -90,6 +89,6 @@ class AutopilotSpec:
         Raises
         ------
         ValueError
-            If this UAV does not hear it.
+            If it is no in-neighbour of this UAV.
         """
         return [neighbour.uav for neighbour in self.neighbours].index(sender)

@@ -81,7 +81,7 @@ class AutopilotView:
         return (int(self.done[0]) + 1) * self.setting.timing.period_us
 
     def acting_time(self) -> tuple[int, str]:
-        """When what the ground asks for now acts (FTCC_AT), us, or why it cannot."""
+        """When a request of now acts by FTCC_AT, us, or why it cannot."""
         at_us = self.at_ms * 1000
         if at_us == 0:
             return self.next_us, ""

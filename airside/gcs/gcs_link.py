@@ -49,7 +49,7 @@ class GcsLink:
         self._guard = ErrorGuard(view)
         self._last_heartbeat = 0.0
         self._turned_away = -math.inf
-        """When a caller was told that there is no place for it, wall s (monotonic)."""
+        """When a caller was last refused telemetry, wall s (monotonic)."""
         outbox = Outbox(view, self.sockets[1:])
         telemetry = Telemetry(view, self._guard, self.sockets)
         self.services = Services(
@@ -141,7 +141,7 @@ class GcsLink:
         self._signatures.log_refusals(socket.codec)
 
     def _welcome(self, peer: Peer) -> None:
-        """Begin to send telemetry to who is new, or say why not."""
+        """Begin to send telemetry to a new peer, or answer why not."""
         if not peer.remembered:
             now, text = time.monotonic(), "too many clients: answers only, no telemetry"
             if now - self._turned_away > _TURNED_AWAY:

@@ -20,8 +20,8 @@ class Schedule:
     Parameters
     ----------
     rates : of each stream, Hz; 0 = silent.
-    least : of each stream, Hz in simulated time alone, however fast that goes by; 0, or left out: none. Who sends looks
-        for them once a simulated second: `next_us` does not speak of them.
+    least : of each stream, Hz in simulated time alone, however fast that goes by; 0, or left out: none. The sender
+        looks for them once a simulated second: `next_us` does not count them.
     """
 
     def __init__(self, rates: Iterable[float], least: Iterable[float] = ()) -> None:

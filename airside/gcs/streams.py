@@ -192,15 +192,8 @@ def _attitude_target(view: AutopilotView) -> Any:
     if view.scheme.plant == "attitude" and not view.leader:
         wanted = fields(AttitudeReference, view.autopilots.reference[view.i])
         rates = 0b111
-        return _M.MAVLink_attitude_target_message(
-            _stamp(view),
-            rates,
-            body_attitude(own.chi, own.gamma, wanted.mu, wanted.alpha, wanted.beta),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        )
+        attitude = body_attitude(own.chi, own.gamma, wanted.mu, wanted.alpha, wanted.beta)
+        return _M.MAVLink_attitude_target_message(_stamp(view), rates, attitude, 0.0, 0.0, 0.0, 0.0)
     pitch = own.theta if view.leader else _signal(view, "theta_d")
     rate = 0.0 if view.leader else _signal(view, "q_d")
     ignored = _M.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE | _M.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE

@@ -59,7 +59,7 @@ class Telemetry:
         return min(schedule.next_wall for _, schedule in self._flows)
 
     def default_rate(self, n: int) -> float:
-        """Rate of stream ``n`` towards who asks for no other, Hz."""
+        """Rate of stream ``n`` where a peer asks for no other, Hz."""
         return self._rates[n]
 
     def set_default_rate(self, n: int, rate: float) -> None:

@@ -1,6 +1,6 @@
-"""What is to be tracked: the leaders' profiles, and what a UAV refers to by itself.
+"""What is tracked: the leaders' profiles, and a UAV's own reference.
 
-The latter is chosen by the scheme's ``PLANT``: the module of that name declares the NamedTuple ``Reference`` and the
+The latter depends on the scheme's ``PLANT``: the module of that name declares the NamedTuple ``Reference`` and the
 compiled ``refer(parameters, commands, reference, now_us, period_us)``, which brings a UAV's row of references to the
 tick at ``now_us`` and is called once at every tick, and ``stand(reference, period_us)``, which is called in its place
 in hold and returns whether the clock of the commands stands still, too.

@@ -74,10 +74,10 @@ def refer(parameters, commands, reference, now_us, period_us):
                 latest = n
         for axis in range(3):
             error = commands[latest, 1 + axis] - reference[axis]
-            reference[_RATE + axis] += (
-                h * a.frequency * (a.frequency * error - 2.0 * a.damping * reference[_RATE + axis])
-            )
-            reference[axis] += h * reference[_RATE + axis]
+            rate = reference[_RATE + axis]
+            rate += h * a.frequency * (a.frequency * error - 2.0 * a.damping * rate)
+            reference[_RATE + axis] = rate
+            reference[axis] += h * rate
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Motion in the vertical plane: followers of leaders know the mission's constants and nothing else by themselves."""
+"""Motion in the vertical plane: a follower's own reference is the constants of the mission, and nothing else."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ The fire breaks out ``age`` seconds before t = 0; its half axes grow with ``spre
 centre drifts with the wind. A UAV's post is the border's point of phase omega t + phi, shifted by its safe distance.
 The axes stay north and east.
 
-The ground may tell another place or drift of the fire from one simulated time on, the same for all UAVs. The fire is
+The ground may set another place or drift of the fire from one simulated time on, the same for all UAVs. The fire is
 there at once; the formation follows it through a shaper of limited speed and acceleration (not in the monograph).
 """
 
@@ -124,9 +124,9 @@ def moved(
 
 
 def newest(commands: NDArray[np.float64]) -> Command:
-    """What the ground, or else the scenario, last said of the fire, be it in force yet or not."""
-    said = np.flatnonzero(np.isfinite(commands[:, 0]))
-    return Command(*commands[said[-1]].tolist())
+    """The last command about the fire, by the ground or else by the scenario, be it in force yet or not."""
+    given = np.flatnonzero(np.isfinite(commands[:, 0]))
+    return Command(*commands[given[-1]].tolist())
 
 
 def change_from_ground(commands: NDArray[np.float64], now: float, at: float, field: str, value: float) -> bool:

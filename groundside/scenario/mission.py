@@ -304,7 +304,7 @@ def _autopilots(
             datum=vehicle.datum,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
             attitude_code=vehicle.attitude_code,
-            hearers=tuple(graph.receivers(vehicle.uav)),
+            receivers=tuple(graph.receivers(vehicle.uav)),
         )
         for vehicle in vehicles
     )

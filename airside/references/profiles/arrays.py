@@ -75,7 +75,7 @@ CLAMPED = 6
 PROFILE_STATES = 7
 
 FROM_GROUND = 4
-"""The last rows of a profile's commands: what the ground has asked for, in order of time; it overrules all others."""
+"""The last rows of a profile's commands: commands of the ground, in order of time, which overrule all others."""
 
 
 class TriggerRow(NamedTuple):

@@ -36,7 +36,7 @@ def climb_of_step(altitude_filter: tuple[float, float], step: float) -> float:
 def sampled(profiles: Mapping[int, Profile], duration: float, period: float) -> dict[int, Any]:
     """The leaders' profiles over a flight, by id: arrays (n, c) in the order of `Reference`; all hear each other.
 
-    The arrays cannot be written: who asks again gets the same ones.
+    The arrays are read-only: the next call with the same arguments returns the same ones.
     """
     if not profiles:
         return {}
@@ -68,7 +68,7 @@ def _sample(parameters, commands, triggers, states, row, watched, period_us, row
     """Fly all profiles tick by tick into ``rows`` (k, n, c); ``row`` (k, c) and ``watched`` (k,) are scratch."""
     period = period_us / 1e6
     for n in range(rows.shape[1]):
-        # What each knows of the others: their last position, carried over one period.
+        # Of the others each leader has the last position, carried over one period.
         for i in range(rows.shape[0]):
             watched[i] = row[i, _X] + row[i, _X_DOT] * period
         for i in range(rows.shape[0]):

@@ -292,10 +292,10 @@ def test_links_are_cut_degraded_and_restored_at_their_time(bench, station):
 def test_the_own_radio_is_switched_off_and_on(bench, station):
     station.cut(1)
     bench.answer(1, LEVEL, np.zeros(4))
-    assert bench.process.group.events.radio_on[0] == 0
+    assert bench.process.group.link_events.radio_on[0] == 0
     station.restore(1)
     bench.answer(2, LEVEL, np.zeros(4))
-    assert bench.process.group.events.radio_on[0] == 1
+    assert bench.process.group.link_events.radio_on[0] == 1
 
 
 # Modes.
