@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from types import ModuleType
 
 from ftcc.airside.scheme import Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.claims import check_expression
 from ftcc.groundside.scenario.columns import LEADING
-from ftcc.groundside.scenario.loading import Scenario, ScenarioError, whole
+from ftcc.groundside.scenario.loading import Scenario, whole
 from ftcc.groundside.schema import Plan, Rates, Start
 from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
@@ -45,8 +44,8 @@ _MOST_PERIODS = 30
 class Findings:
     """Collects what is wrong, so that a user sees all of it at once."""
 
-    def __init__(self, file: Path) -> None:
-        self.file = file
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
         self.refused: list[str] = []
         self.warned: list[str] = []
 
@@ -55,7 +54,7 @@ class Findings:
 
     def stop_if_refused(self) -> None:
         if self.refused:
-            raise ScenarioError(self.file, list(dict.fromkeys(self.refused)))
+            raise self.scenario.error(list(dict.fromkeys(self.refused)))
 
 
 def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:

@@ -1,24 +1,33 @@
 """Scenarios: merging the form, variants and settings of a file, and saying clearly what is wrong with it.
 
-A file holds what all flights share, ``[form.NAME]`` and ``[variant.NAME]`` blocks with what they change, and claims. A
-variant may hold ``[variant.NAME.FORM]`` with what it changes in that form alone. Merged in the order: file, form,
-variants as the file lists them, settings of the command line. Tables are merged, everything else is replaced.
+A file holds what all flights share, ``[form.NAME]`` and ``[variant.NAME]`` blocks with what they change, and claims;
+variants and claims may stand in files beside it (`catalogue`). A variant may hold ``[variant.NAME.FORM]`` with what it
+changes in that form alone. Merged in the order: file, form, variants as the file lists them, settings of the command
+line. Tables are merged, everything else is replaced.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 import tomllib
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ftcc.groundside.scenario.catalogue import ScenarioError, find, forms_and_variants, parsed, read, shipped, text_of
+from ftcc.groundside.scenario.catalogue import (
+    Contents,
+    ScenarioError,
+    contents_of,
+    find,
+    forms_and_variants,
+    read,
+    shipped,
+)
+from ftcc.groundside.scenario.places import Layer, Places
 from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet, fields_of
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
@@ -41,20 +50,18 @@ class Scenario:
     document: dict[str, Any]
     """What ``plan`` was made from, as it would stand in a file."""
     source: dict[str, Any]
-    """The whole file, with all its forms and variants."""
+    """The whole file, with all its forms, variants and claims, and those of the files beside it."""
+    files: tuple[Path, ...]
+    places: Places
 
     @property
     def case(self) -> str:
         """The key of the claims' expected values."""
         return "+".join((self.form, *self.variants))
 
-
-_parsed = functools.lru_cache(maxsize=16)(parsed)
-
-
-def _contents(path: Path) -> dict[str, Any]:
-    """The contents of a file, parsed once for all the cases that are made from them: nobody changes them."""
-    return _parsed(path, text_of(path))
+    def error(self, problems: Sequence[str]) -> ScenarioError:
+        """What is to be raised where these are wrong with it."""
+        return _error(self.file, problems, self.places)
 
 
 def load(
@@ -85,7 +92,8 @@ def load(
     ScenarioError
     """
     path = find(name_or_path)
-    document = _contents(path)
+    contents = contents_of(path)
+    document = contents.document
     _require_tables(path, document)
     known_forms, known_variants = forms_and_variants(document)
     flown = "flown" in document
@@ -102,45 +110,57 @@ def load(
         there_are = f"there are {', '.join(known_variants)}" if known_variants else "the file has none"
         raise ScenarioError(path, [f"variant = {', '.join(unknown)}: there is no such variant; {there_are}"])
     ordered = tuple(name for name in known_variants if name in variants)
-    merged = {key: value for key, value in document.items() if key not in ("form", "variant")}
+    layers = [Layer("base", path, (), document)]
     if not flown:
-        merged = _merged(merged, document.get("form", {}).get(chosen, {}))
-        for name in ordered:
-            merged = _merged(merged, _variant(path, name, known_variants[name], chosen, known_forms))
+        layers += _changes(contents, chosen, known_forms, ordered)
+    merged = {key: value for key, value in document.items() if key not in ("form", "variant")}
+    for layer in layers[1:]:
+        merged = _merged(merged, layer.content)
     for setting in settings:
         merged = _set(path, merged, setting)
-    if seed is not None:
-        merged["seed"] = seed
-    if duration is not None:
-        merged["duration"] = duration
-    plan = validate(Plan, merged, path)
+        layers.append(Layer(f"--set {setting}", None, (), _nested(setting)))
+    for option, value in (("seed", seed), ("duration", duration)):
+        if value is not None:
+            merged[option] = value
+            layers.append(Layer(f"--{option}", None, (), {option: value}))
+    places = Places(contents, layers)
+    plan = validate(Plan, merged, path, places)
     inheriting = {name: block["claims_of"] for name, block in known_variants.items() if "claims_of" in block}
     if inheriting and plan.flown is None:
         for name, case in inheriting.items():
-            merged["claims"] = _inherited(path, merged.get("claims", []), name, case, known_forms, list(known_variants))
-        plan = validate(Plan, merged, path)
+            try:
+                inherited = _inherited(merged.get("claims", []), name, case, known_forms, list(known_variants))
+            except ValueError as error:
+                raise _error(path, [str(error)], places) from None
+            merged["claims"] = inherited
+        plan = validate(Plan, merged, path, places)
     name = path.stem
     if plan.flown is not None:
         name, ordered = plan.flown.name, tuple(plan.flown.variants)
         settings = (*plan.flown.settings, *settings)
     else:
-        _check_cases(path, plan, known_forms, list(known_variants))
-    return Scenario(name, path, chosen, ordered, tuple(settings), plan, merged, document)
+        problems = _cases_of_none(plan, known_forms, list(known_variants))
+        if problems:
+            raise _error(path, problems, places)
+    return Scenario(
+        name, path, chosen, ordered, tuple(settings), plan, merged, document, files=contents.files, places=places
+    )
 
 
-def load_airframe(name_or_path: str, scenario_file: Path) -> AirframeSheet | PointMassSheet:
+def _error(file: Path, problems: Sequence[str], places: Places | None) -> ScenarioError:
+    return ScenarioError(file, problems, [places.located(one) for one in problems] if places else None)
+
+
+def load_airframe(
+    name_or_path: str, scenario_file: Path, places: Places | None = None
+) -> AirframeSheet | PointMassSheet:
     """The sheet of a shipped airframe, or of a path relative to the scenario's file."""
     sheets = shipped("airframes")
     path = sheets.get(name_or_path, scenario_file.parent / name_or_path)
     if not path.is_file():
-        raise ScenarioError(
-            scenario_file,
-            [
-                f"airframe = {name_or_path!r}: there is no such sheet; "
-                f"there are {', '.join(sheets)}, or give a TOML file"
-            ],
-        )
-    document = _contents(path)
+        there_are = f"there are {', '.join(sheets)}, or give a TOML file"
+        raise _error(scenario_file, [f"airframe = {name_or_path!r}: there is no such sheet; {there_are}"], places)
+    document = read(path)
     if "kd" in document:
         return validate(PointMassSheet, document, path)
     return validate(AirframeSheet, document, path)
@@ -153,27 +173,35 @@ def _require_tables(path: Path, document: dict[str, Any]) -> None:
             raise ScenarioError(path, [f"{key} = {_shown(blocks)}: must be tables, [{key}.NAME]"])
 
 
-def _variant(path: Path, name: str, block: dict[str, Any], form: str, forms: Sequence[str]) -> dict[str, Any]:
-    """What a variant changes in a form."""
-    allowed = block.get("forms", list(forms))
-    if form not in allowed:
-        raise ScenarioError(path, [f"variant = {name}: flies in form {', '.join(allowed)}, not in {form}"])
-    changes = {key: value for key, value in block.items() if key not in (*_VARIANT_KEYS, *forms)}
-    return _merged(changes, block.get(form, {}))
+def _changes(contents: Contents, form: str, forms: Sequence[str], variants: Sequence[str]) -> Iterator[Layer]:
+    """What the form and the variants change, in the order in which they are merged."""
+    main, document = contents.files[0], contents.document
+    yield Layer(f"form {form}", main, ("form", form), document.get("form", {}).get(form, {}))
+    for name in variants:
+        block, file, where = document["variant"][name], contents.variants[name], ("variant", name)
+        allowed = block.get("forms", forms)
+        if form not in allowed:
+            raise ScenarioError(main, [f"variant = {name}: flies in form {', '.join(allowed)}, not in {form}"])
+        changes = {key: value for key, value in block.items() if key not in (*_VARIANT_KEYS, *forms)}
+        yield Layer(f"variant {name}", file, where, changes)
+        if form in block:
+            yield Layer(f"variant {name} in form {form}", file, (*where, form), block[form])
 
 
 def _inherited(
-    path: Path, claims: list[dict[str, Any]], variant: str, case: Any, forms: Sequence[str], variants: Sequence[str]
+    claims: list[dict[str, Any]], variant: str, case: Any, forms: Sequence[str], variants: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """The claims, those of ``case`` also for ``case`` with ``variant`` where they say nothing of it."""
+    """The claims, those of ``case`` also for ``case`` with ``variant`` where they say nothing of it.
+
+    Raises
+    ------
+    ValueError
+    """
     form, *names = str(case).split("+")
     if form not in forms or names != [name for name in variants if name in names] or variant in names:
-        raise ScenarioError(
-            path,
-            [
-                f"variant.{variant}.claims_of = {case!r}: must be a form ({', '.join(forms)}), "
-                f"followed by other variants of the file, each after a +, in the file's order"
-            ],
+        raise ValueError(
+            f"variant.{variant}.claims_of = {case!r}: must be a form ({', '.join(forms)}), "
+            f"followed by other variants of the file, each after a +, in the file's order"
         )
     own = "+".join((form, *(name for name in variants if name in (*names, variant))))
     result = []
@@ -189,8 +217,8 @@ def _inherited(
     return result
 
 
-def _check_cases(path: Path, plan: Plan, forms: Sequence[str], variants: Sequence[str]) -> None:
-    """Refuse claims for cases that nobody can ask for: a typing error must not make a claim disappear."""
+def _cases_of_none(plan: Plan, forms: Sequence[str], variants: Sequence[str]) -> list[str]:
+    """Claims for cases that nobody can ask for: a typing error must not make a claim disappear."""
     problems = []
     for n, claim in enumerate(plan.claims):
         for case in claim.expected:
@@ -200,8 +228,7 @@ def _check_cases(path: Path, plan: Plan, forms: Sequence[str], variants: Sequenc
                     f"claims.{n}.expected: case {case!r} ({claim.name}) must be a form ({', '.join(forms)}), "
                     f"followed by variants that the file declares, each after a +, in the file's order"
                 )
-    if problems:
-        raise ScenarioError(path, problems)
+    return problems
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -212,25 +239,37 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
-    """``document`` with one ``key.path=value`` applied."""
-    key, equals, text = setting.partition("=")
-    parts = key.strip().split(".")
-    if not equals or not all(parts):
-        raise ScenarioError(path, [f"--set {setting}: must be key.path=value, such as channel.loss=0.3"])
+def _key_and_value(setting: str) -> tuple[list[str], Any]:
+    """The keys and the value of a ``key.path=value``; what is no TOML is text."""
+    key, _, text = setting.partition("=")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text.strip()
+    return key.strip().split("."), value
+
+
+def _nested(setting: str) -> dict[str, Any]:
+    """A setting as a table that holds nothing else."""
+    parts, node = _key_and_value(setting)
+    for part in reversed(parts):
+        node = {part: node}
+    return node  # type: ignore[no-any-return]
+
+
+def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
+    """``document`` with one ``key.path=value`` applied."""
+    parts, value = _key_and_value(setting)
+    if "=" not in setting or not all(parts):
+        raise ScenarioError(path, [f"--set {setting}: must be key.path=value, such as channel.loss=0.3"])
 
     def changed(node: Any, rest: list[str]) -> Any:
         if not rest:
             return value
         if isinstance(node, list):
             if not rest[0].isdecimal() or int(rest[0]) >= len(node):
-                raise ScenarioError(
-                    path, [f"--set {setting}: {key} has {len(node)} entries, counted from 0; {rest[0]} is none of them"]
-                )
+                entries = f"{'.'.join(parts)} has {len(node)} entries, counted from 0"
+                raise ScenarioError(path, [f"--set {setting}: {entries}; {rest[0]} is none of them"])
             index = int(rest[0])
             return [*node[:index], changed(node[index], rest[1:]), *node[index + 1 :]]
         inner = node if isinstance(node, dict) else {}
@@ -239,13 +278,13 @@ def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
     return changed(document, parts)  # type: ignore[no-any-return]
 
 
-def validate(model: type[M], document: dict[str, Any], file: Path) -> M:
+def validate(model: type[M], document: dict[str, Any], file: Path, places: Places | None = None) -> M:
     """``document`` as ``model``, or all that is wrong with it."""
     try:
         return model.model_validate(document)
     except ValidationError as error:
         problems = [_problem(model, document, one) for one in error.errors(include_url=False)]
-        raise ScenarioError(file, list(dict.fromkeys(problems))) from None
+        raise _error(file, list(dict.fromkeys(problems)), places) from None
 
 
 def _problem(model: type[BaseModel], document: Any, error: Any) -> str:

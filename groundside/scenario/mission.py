@@ -127,7 +127,7 @@ def resolve(scenario: Scenario) -> Mission:
     ScenarioError
         With all that is wrong.
     """
-    plan, findings = scenario.plan, Findings(scenario.file)
+    plan, findings = scenario.plan, Findings(scenario)
     basis = _basis(scenario, findings)
     references = own_references(plan, basis.scheme.plant, basis.graph.followers, basis.timing, findings)
     profiles = profiles_of(plan, basis.graph, findings)
@@ -198,7 +198,7 @@ def _basis(scenario: Scenario, findings: Findings) -> _Basis:
     check_wind(plan, plant, findings)
     limits = limits_of(plan, plant, findings)
     graph = graph_of(plan, scheme, findings)
-    sheet = load_airframe(plan.airframe, scenario.file)
+    sheet = load_airframe(plan.airframe, scenario.file, scenario.places)
     airframe = true_airframe(plan, sheet, plant, findings)
     findings.stop_if_refused()
     return _Basis(scheme, wire, timing, plant, limits, graph, sheet, airframe)
