@@ -2,7 +2,7 @@
 
 A ``[[table]]`` has ``columns`` and ``rows``; every other key is a field that all its claims share. Where ``columns``
 are names, a row is a claim: columns named as fields of a claim hold its fields, all others are cases with the numbers
-that it expects. Where ``columns`` are tables, a column is a claim, and ``rows`` is a table of cases: what they expect,
+that it expects, or ``case`` and ``expected`` name one case and its number. Where ``columns`` are tables, a column is a claim, and ``rows`` is a table of cases: what they expect,
 a number a column. ``""`` leaves a cell empty. ``part`` says where in the shared source a claim stands.
 """
 
@@ -52,6 +52,8 @@ def _a_claim_a_row(
         filled = {column: cell for column, cell in zip(columns, cells) if cell != _EMPTY}
         own = {column: cell for column, cell in filled.items() if column in (*FIELDS, "part")}
         expected = {column: cell for column, cell in filled.items() if column not in own}
+        if "case" in expected:
+            expected[expected.pop("case")] = expected.pop("expected", None)
         yield ("rows", str(n)), _claim(f"rows.{n}", shared, own, expected)
 
 
