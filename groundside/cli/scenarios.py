@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ from ftcc.groundside.cli.common import (
     Settings,
     Strict,
     Variants,
+    fail,
     judged,
     load_mission,
     load_scenario,
@@ -24,6 +25,9 @@ from ftcc.groundside.cli.common import (
     terminal,
     warn,
 )
+
+if TYPE_CHECKING:
+    from ftcc.groundside.scenario import Scenario
 
 __all__ = ["check", "list_all", "simulate", "verify"]
 
@@ -60,16 +64,30 @@ def list_all() -> None:
     out.print(scenarios)
 
 
-def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", settings: Settings = None) -> None:
+def check(
+    scenario: ScenarioName,
+    form: Form = None,
+    variant: Variants = "",
+    settings: Settings = None,
+    where: Annotated[
+        str | None,
+        typer.Option(metavar="KEY", help="Only show which file, block and line a value came from: plant.lag.thrust."),
+    ] = None,
+) -> None:
     """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
     from ftcc.groundside.scenario import resolve
     from ftcc.groundside.simulation import cases_of, load_case
 
     first = load_scenario(scenario, form, variant, settings)
+    if where is not None:
+        _show_origin(first, where)
+        return
     cases = {first.case: first}
     if form is None and not variant and first.plan.flown is None:
         cases |= {case: load_case(scenario, case, settings or []) for case in cases_of(first) if case != first.case}
     out = terminal()
+    for file, held in first.places.files().items():
+        out.print(f"{file.name}: {held}", markup=False, highlight=False, soft_wrap=not out.is_terminal)
     warned: dict[str, list[str]] = {}
     for case, chosen in cases.items():
         mission = resolve(chosen)
@@ -87,6 +105,35 @@ def check(scenario: ScenarioName, form: Form = None, variant: Variants = "", set
     for text, those in warned.items():
         where = f" {', '.join(those)}" if len(those) < len(cases) else ""
         warn(f"{first.name}{where}: {text}")
+
+
+def _show_origin(scenario: Scenario, key: str) -> None:
+    """Print the values at ``key``, each with the file, line and block that gave it last."""
+    out = terminal()
+    places = scenario.places.of(key)
+    if not places:
+        value = _at(scenario.plan.model_dump(by_alias=True), key)
+        if value is None:
+            fail(f"--where {key}: nothing in this scenario gives it, and it has no default")
+        out.print(f"{key} = {value!r}: the default, no file gives it", markup=False, highlight=False)
+    for leaf, place in places.items():
+        value = repr(_at(scenario.source | scenario.document, leaf))
+        given = f"{leaf} = {value if len(value) <= 80 else value[:77] + '...'}"
+        at = f"{place}, {place.layer}" if place.file else place.layer
+        same = "" if place.key == leaf else f" ({place.key})"
+        out.print(f"{given}: {at}{same}", markup=False, highlight=False, soft_wrap=not out.is_terminal)
+
+
+def _at(document: Any, key: str) -> Any:
+    """The value at a path of keys, and of numbers in lists; None where there is none."""
+    for part in key.split("."):
+        if isinstance(document, dict):
+            document = document.get(part)
+        elif isinstance(document, list) and part.isdecimal() and int(part) < len(document):
+            document = document[int(part)]
+        else:
+            return None
+    return document
 
 
 def simulate(

@@ -1,9 +1,10 @@
 """Tables of claims: many claims in the shape in which a paper prints them, one line a row.
 
 A ``[[table]]`` has ``columns`` and ``rows``; every other key is a field that all its claims share. Where ``columns``
-are names, a row is a claim: columns named as fields of a claim hold its fields, all others are cases with the numbers
-that it expects, or ``case`` and ``expected`` name one case and its number. Where ``columns`` are tables, a column is a claim, and ``rows`` is a table of cases: what they expect,
-a number a column. ``""`` leaves a cell empty. ``part`` says where in the shared source a claim stands.
+are names, a row is a claim: columns named as fields of a claim hold its fields, all others are cases with what it
+expects there; or ``case`` and ``expected`` name the one case of each row and its number. Where ``columns`` are tables,
+a column is a claim, and ``rows`` is a table of cases, each with what is expected of it, column by column. ``""`` leaves
+a cell empty. ``part`` says where in the shared source a claim stands.
 """
 
 from __future__ import annotations

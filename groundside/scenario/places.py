@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ftcc.groundside.scenario.catalogue import Contents, text_of
+from ftcc.groundside.scenario.catalogue import Contents, forms_and_variants, text_of
 
 __all__ = ["Layer", "Place", "Places", "line_of"]
 
@@ -48,8 +49,8 @@ class Places:
         self._contents = contents
         self._layers = layers
 
-    def of(self, key: str) -> list[Place]:
-        """Where the value of ``key``, a path such as "plant.lag.thrust", was given last; a table's, key by key.
+    def of(self, key: str) -> dict[str, Place]:
+        """Where the value of ``key``, a path such as "plant.lag.thrust", was given last; that of a table key by key.
 
         Empty where the scenario does not give it.
         """
@@ -63,7 +64,25 @@ class Places:
                         found[leaf] = self._place(layer, leaf)
             if not isinstance(value, dict):
                 break  # this block replaces what stood before it
-        return sorted(found.values(), key=lambda place: place.key)
+        return {".".join(leaf): found[leaf] for leaf in sorted(found)}
+
+    def files(self) -> dict[Path, str]:
+        """What each file of the scenario holds, in words."""
+        contents, document = self._contents, self._contents.document
+        held = {}
+        for file in contents.files:
+            variants = sum(holder == file for holder in contents.variants.values())
+            claims = [document["claims"][n] for n, origin in enumerate(contents.claims) if origin.file == file]
+            cases = {case for claim in claims for case in claim["expected"]}
+            words = []
+            if file == contents.files[0]:
+                words.append(f"what flies, in form {' or '.join(forms_and_variants(document)[0])}")
+            if variants:
+                words.append(_counted(variants, "variant"))
+            if claims:
+                words.append(f"{_counted(len(claims), 'claim')} of {_counted(len(cases), 'case')}")
+            held[file] = "; ".join(words)
+        return held
 
     def located(self, problem: str) -> str:
         """A problem with the file and the line of the key that it begins with."""
@@ -104,6 +123,10 @@ class Places:
         return Place(layer.name, file, line, ".".join(path[len(layer.path) :]))
 
 
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"
+
+
 def _value(node: Any, parts: Sequence[str]) -> tuple[Any, bool]:
     """What stands at ``parts``; or the last thing on the way that is there (a table that lacks the rest), and False."""
     for part in parts:
@@ -140,8 +163,10 @@ def line_of(text: str, path: Sequence[str]) -> int | None:
     return best[1] if best else None
 
 
-def _statements(text: str) -> Iterator[tuple[int, list[str], tuple[str, ...], Any]]:
+@functools.lru_cache(maxsize=4)
+def _statements(text: str) -> list[tuple[int, list[str], tuple[str, ...], Any]]:
     """First line, lines, keys from the top and value of each statement: a table's header, or a key with its value."""
+    found = []
     table: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
     pending: list[str] = []
@@ -157,7 +182,7 @@ def _statements(text: str) -> Iterator[tuple[int, list[str], tuple[str, ...], An
         header = lines[0].lstrip().startswith("[")
         keys, value = _descend(said, header)
         if not header:
-            yield number - len(lines) + 1, lines, (*table, *keys), value
+            found.append((number - len(lines) + 1, lines, (*table, *keys), value))
             continue
         table = ()
         for n, key in enumerate(keys):
@@ -166,7 +191,8 @@ def _statements(text: str) -> Iterator[tuple[int, list[str], tuple[str, ...], An
                 counts[table] = counts.get(table, -1) + 1
             if table in counts:
                 table = (*table, str(counts[table]))
-        yield number, lines, table, None
+        found.append((number, lines, table, None))
+    return found
 
 
 def _descend(said: Any, header: bool) -> tuple[tuple[str, ...], Any]:
