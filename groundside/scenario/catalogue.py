@@ -142,9 +142,8 @@ def _contents(texts: tuple[tuple[Path, str], ...]) -> Contents:
                     claims.append(claim)
                     origins.append(Origin(file, (*here, *within)))
             except ValueError as error:
-                raise _refused(
-                    file, content, (*here, *str(error).partition(":")[0].split(".")), f"table.{n}.{error}"
-                ) from None
+                place = (*here, *str(error).partition(":")[0].split("."))
+                raise _refused(file, content, place, f"table.{n}.{error}") from None
         if order := part.get("order"):
             variants = _ordered(file, content, variants, order)
     document = {key: value for key, value in document.items() if key != "table"}
