@@ -13,7 +13,7 @@ import numpy as np
 from ftcc.airside.group import AutopilotGroup
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.exchange import Header, begin, new_transmission, octets_of, problem_text, take_in
-from ftcc.link.gate import Gate, Said
+from ftcc.link.gate import EventReport, Gate
 from ftcc.link.mesh import Mesh
 from ftcc.link.process import Setting
 
@@ -113,7 +113,7 @@ class Neighbourhood:
     def _warn_once(self, text: str) -> None:
         self._bad += 1
         if self._bad == 1:
-            self._gate.tell(Said("warning", f"mesh: {text}"))
+            self._gate.report(EventReport("warning", f"mesh: {text}"))
 
     def _count(self) -> None:
         """Set up to which number everything is received and acknowledged; processes that have died do not count."""

@@ -21,7 +21,7 @@ from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import entry_of
-from ftcc.link.gate import Ended, Gate, Ready, Said
+from ftcc.link.gate import Ended, EventReport, Gate, Ready
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint, ending_message, ends
 from ftcc.link.process import Setting, Stall, Waiter
 from ftcc.link.recording import LINK_COLUMNS, Column, Recorder, part_path
@@ -50,9 +50,9 @@ def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     try:
         if refusal and specs[0].uav == min(setting.ports):
             # One process reports it for all.
-            gate.tell(Said("warning", refusal))
+            gate.report(EventReport("warning", refusal))
         process.wait_for_neighbours()
-        gate.tell(Ready())
+        gate.report(Ready())
         gate.wait_until_go()
         process.fly()
     finally:
@@ -110,7 +110,7 @@ class AutopilotProcess:
 
     def report_trouble(self, text: str) -> None:
         """Log that something cannot be recorded."""
-        self.gate.tell(Said("error", text))
+        self.gate.report(EventReport("error", text))
 
     def view(self, i: int) -> AutopilotView:
         """What the side towards the ground sees of autopilot ``i``."""
@@ -125,7 +125,7 @@ class AutopilotProcess:
             state=self.group.states[i],
             controls=self.group.controls[i],
             vehicle=self.vehicles[i],
-            send_to_launcher=self.gate.tell,
+            send_to_launcher=self.gate.report,
             done=self.group.done[i : i + 1],
         )
 
@@ -135,7 +135,7 @@ class AutopilotProcess:
         while not self.neighbourhood.ready and not self.gate.stopping:
             self.waiter.wait(_SUBSCRIPTIONS)
             if self.stall.long:
-                self.gate.tell(Said("warning", f"mesh: still waiting for {self.neighbourhood.awaited}"))
+                self.gate.report(EventReport("warning", f"mesh: still waiting for {self.neighbourhood.awaited}"))
 
     def fly(self) -> None:
         """All ticks, or until everybody is lost or the launcher stops the flight."""
@@ -171,7 +171,7 @@ class AutopilotProcess:
             self.link_recorder.write_if_due()
         if to_do & EVENTS:
             for at_us, uav, severity, text in drain_leader_events(self.group.autopilots, self.specs):
-                self.gate.tell(Said(severity, text, uav, at_us))
+                self.gate.report(EventReport(severity, text, uav, at_us))
         if to_do & (TELEMETRY | SECOND):
             # What the log has of each simulated second is sent when this process is awake anyhow.
             self.send_telemetry()
@@ -226,7 +226,9 @@ class AutopilotProcess:
             pending = zip(self.specs, self.group.pending, strict=True)
             missing = [f"the state of UAV {spec.uav}" for spec, tick in pending if tick < 0]
             waits_for = ", ".join(missing) or self.neighbourhood.missing()
-            self.gate.tell(Said("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {waits_for}"))
+            self.gate.report(
+                EventReport("warning", f"autopilots of UAV {self.names} at tick {tick} wait for {waits_for}")
+            )
 
     progress = -1
     """Ticks of all at the last look."""
@@ -262,9 +264,9 @@ class AutopilotProcess:
             dropped = {reason: count for reason, count in link.dropped().items() if count}
             if dropped:
                 listed = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items())
-                self.gate.tell(Said("info", f"dropped what came from the ground: {listed}", spec.uav))
+                self.gate.report(EventReport("info", f"dropped what came from the ground: {listed}", spec.uav))
         flown = int(self.group.done.max()) + 1
-        self.gate.tell(Ended(flown, 0, flown * len(self.specs)))
+        self.gate.report(Ended(flown, 0, flown * len(self.specs)))
         self.gate.wait_until_released(60.0)
 
     def close(self) -> None:

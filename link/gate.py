@@ -13,6 +13,7 @@ from typing import Any
 
 __all__ = [
     "Ended",
+    "EventReport",
     "Gate",
     "Go",
     "Gone",
@@ -23,7 +24,6 @@ __all__ = [
     "Pace",
     "Ready",
     "Release",
-    "Said",
     "Stop",
 ]
 
@@ -60,7 +60,7 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Said:
+class EventReport:
     """Process -> launcher: an event, for the log and the dashboard."""
 
     severity: str
@@ -143,7 +143,7 @@ class Gate:
         """For ``select``."""
         return self.pipe.fileno()
 
-    def tell(self, message: Any) -> None:
+    def report(self, message: Any) -> None:
         """Send a message to the launcher.
 
         Raises
@@ -199,7 +199,7 @@ class Gate:
         """Report, once, that the limit holds this process before a tick."""
         if self._held != tick:
             self._held = tick
-            self.tell(Held(tick))
+            self.report(Held(tick))
 
     def wait_until_go(self) -> None:
         """Block until the flight begins or is called off."""

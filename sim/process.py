@@ -17,7 +17,7 @@ from ftcc.link.actuators import ACTUATORS, SLOT, by_slot, in_slots, unit_of
 from ftcc.link.compiled import entry_of
 from ftcc.link.events import drain_events
 from ftcc.link.failures import Failure, failure_answer, read_failure
-from ftcc.link.gate import Ended, Gate, Lost, Ready, Said
+from ftcc.link.gate import Ended, EventReport, Gate, Lost, Ready
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, Endpoint, dialect, ending_message, ends, float_array
 from ftcc.link.process import Setting, Stall, Telemetry, Waiter
 from ftcc.link.recording import Column, Recorder, is_full, part_path
@@ -79,7 +79,7 @@ def main(specs: Sequence[VehicleSpec], setting: Setting, gate: Gate) -> None:
     """Fly the vehicles of this process from the launcher's go to its release."""
     vehicles = Vehicles(specs, setting, gate)
     try:
-        gate.tell(Ready())
+        gate.report(Ready())
         gate.wait_until_go()
         vehicles.fly()
     finally:
@@ -109,7 +109,7 @@ class Vehicles:
             [part_path(setting.folder, spec.uav, "vehicle") for spec in specs],
             columns(plant, obstacles),
             places(plant, obstacles),
-            on_trouble=lambda text: gate.tell(Said("error", text)),
+            on_trouble=lambda text: gate.report(EventReport("error", text)),
         )
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
@@ -153,7 +153,7 @@ class Vehicles:
             cause = self._fly(self.group, self.timing, self.setting.lockstep)
         self.recorder.close()
         late = int(self.group.late.sum())
-        self.gate.tell(Ended(self.tick, late, self.tick * len(self.specs)))
+        self.gate.report(Ended(self.tick, late, self.tick * len(self.specs)))
         self.gate.wait_until_released(60.0)
 
     def apply_gate(self) -> None:
@@ -177,7 +177,7 @@ class Vehicles:
             wanted = self.now_us - self.timing.period_us
             missing = [i for i in range(len(self.specs)) if self.group.alive[i] and self.group.answered[i] < wanted]
             names = ", ".join(str(self.specs[i].uav) for i in missing)
-            self.gate.tell(Said("warning", f"vehicles wait for commands of UAV {names} at tick {self.tick}"))
+            self.gate.report(EventReport("warning", f"vehicles wait for commands of UAV {names} at tick {self.tick}"))
 
     # Beside the ticks.
 
@@ -225,7 +225,7 @@ class Vehicles:
         if self.group.fleet.events.used[0]:
             for at_us, i, _, number in drain_events(self.group.fleet.events):
                 uav = self.specs[i].uav
-                self.gate.tell(Said("warning", entered_text(uav, number), uav, at_us))
+                self.gate.report(EventReport("warning", entered_text(uav, number), uav, at_us))
         if self.group.lost[0]:
             for i in range(len(self.specs)):
                 if self.group.why[i] and not self.group.alive[i]:
@@ -254,7 +254,7 @@ class Vehicles:
         datagram = self.pilots[i].pack(ending_message())
         keep_sent(self.group.wire, i, datagram)
         send_again(self.group.wire, i)
-        self.gate.tell(Lost(self.specs[i].uav, at_us, LOST[why]))
+        self.gate.report(Lost(self.specs[i].uav, at_us, LOST[why]))
 
     def close(self) -> None:
         """Free the ports."""

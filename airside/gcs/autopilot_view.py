@@ -13,7 +13,7 @@ from ftcc.airside.link_events import LinkEvents
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.channel import Channel, Inbox
-from ftcc.link.gate import Said
+from ftcc.link.gate import EventReport
 from ftcc.link.home import Home
 from ftcc.link.mavlink import Endpoint
 from ftcc.link.process import Setting
@@ -39,7 +39,7 @@ class AutopilotView:
     controls: NDArray[np.float64]
     """(4,): the last command, fractions of travel."""
     vehicle: Endpoint
-    send_to_launcher: Callable[[Said], None]
+    send_to_launcher: Callable[[EventReport], None]
     done: NDArray[np.int64]
     """(1,): its last tick; -1 before the first."""
     alive: bool = True
@@ -100,4 +100,4 @@ class AutopilotView:
     ) -> None:
         """Have the launcher log an event and show it on the ground; without ``at_us`` it is one of the last tick."""
         when = self.now_us if at_us is None else at_us
-        self.send_to_launcher(Said(severity, text, self.spec.uav, when, who, outcome))
+        self.send_to_launcher(EventReport(severity, text, self.spec.uav, when, who, outcome))

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.dashboard import Event
 from ftcc.groundside.swarm.flow import Flow
-from ftcc.link.gate import Ended, Go, Gone, Held, Lost, Ready, Release, Said, Stop
+from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, Lost, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
 from ftcc.link.recording import AIRCRAFT_LOST
@@ -278,7 +278,7 @@ class Swarm:
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
-            case Said(severity, text, uav, at_us, who, outcome):
+            case EventReport(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 
     def _bury(self, child: Child) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from ftcc.link.gate import (
     Ended,
+    EventReport,
     Gate,
     Go,
     Gone,
@@ -20,7 +21,6 @@ from ftcc.link.gate import (
     Pace,
     Ready,
     Release,
-    Said,
     Stop,
 )
 
@@ -35,11 +35,11 @@ def ends() -> Iterator[tuple[Connection, Gate]]:
 
 @pytest.mark.parametrize(
     "message",
-    [Ready(), Ended(400, 1, 400), Lost(3, 32_000_000, "airspeed left the model"), Said("warning", "waits", 2)],
+    [Ready(), Ended(400, 1, 400), Lost(3, 32_000_000, "airspeed left the model"), EventReport("warning", "waits", 2)],
 )
 def test_what_a_process_says_arrives_at_the_launcher(ends, message):
     launcher, gate = ends
-    gate.tell(message)
+    gate.report(message)
     assert launcher.recv() == message
 
 
@@ -122,7 +122,7 @@ def test_a_launcher_that_is_gone_ends_its_processes_wherever_they_wait(ends):
     with pytest.raises(LauncherGoneError):
         gate.wait_until_released(30.0)
     with pytest.raises(LauncherGoneError):
-        gate.tell(Ready())
+        gate.report(Ready())
 
 
 def test_last_words_of_a_launcher_are_heard(ends):

@@ -13,7 +13,7 @@ import pytest
 from ftcc.groundside.swarm.registry import Card, Entry
 from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import dialect
-from ftcc.link.gate import Said
+from ftcc.link.gate import EventReport
 from tests.airside.autopilot_bench import Bench, forged
 
 LEVEL = forged(1000.0, 30.0, 0.0, 0.0322, 0.0)
@@ -37,12 +37,12 @@ def flying(
             yield bench, station
 
 
-def said(bench: Bench) -> list[Said]:
+def said(bench: Bench) -> list[EventReport]:
     """What the autopilot has had logged."""
     found = []
     while bench.launcher.poll(0.05):
         message = bench.launcher.recv()
-        if isinstance(message, Said):
+        if isinstance(message, EventReport):
             found.append(message)
     return found
 
