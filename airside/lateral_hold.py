@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.link.actuators import AILERON, RUDDER
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import wrapped

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.link.compiled import compiled
 
-__all__ = ["Model", "airspeed_model", "clip", "flight_path_model", "level_deflections", "pitch_rate_model"]
+__all__ = ["Model", "airspeed_model", "flight_path_model", "level_deflections", "pitch_rate_model"]
 
 
 class Model(NamedTuple):
@@ -61,12 +62,6 @@ class Model(NamedTuple):
     Cndr: float = 0.0
     Cnp: float = 0.0
     Cnr: float = 0.0
-
-
-@compiled
-def clip(value: float, low: float, high: float) -> float:
-    """``value`` limited to [low, high]."""
-    return min(max(value, low), high)
 
 
 @compiled

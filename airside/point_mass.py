@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip
+from ftcc.airside.elements.vectors import dot
 from ftcc.link.compiled import compiled
 
 __all__ = ["acceleration", "commands_for", "drag", "triad", "velocity"]
@@ -57,18 +58,13 @@ def acceleration(V, gamma, chi, thrust, n, mu, model):
 
 
 @compiled
-def _dot(p, q):
-    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-
-
-@compiled
 def commands_for(x, y, z, V, gamma, chi, bank_max, n_max, model):
     """Thrust (N), load factor and bank (rad), within their limits, that accelerate by ``x, y, z`` (m/s^2)."""
     along, right, up = triad(gamma, chi)
     wanted = (x, y, z + model.g)
-    sideways = _dot(right, wanted)
-    upwards = max(_dot(up, wanted), _LEAST_NORMAL * model.g)
+    sideways = dot(right, wanted)
+    upwards = max(dot(up, wanted), _LEAST_NORMAL * model.g)
     mu = clip(math.atan2(sideways, upwards), -bank_max, bank_max)
     n = min(math.sqrt(sideways * sideways + upwards * upwards) / model.g, n_max)
-    thrust = clip(model.m * _dot(along, wanted) + drag(V, n, model), model.thrust_min, model.thrust_max)
+    thrust = clip(model.m * dot(along, wanted) + drag(V, n, model), model.thrust_min, model.thrust_max)
     return thrust, n, mu

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.elements.nonlinear import sign
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip, sign
 from ftcc.link.compiled import compiled
 
 __all__ = [

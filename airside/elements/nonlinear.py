@@ -6,7 +6,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["limited", "rounded_power", "sign", "signed_power", "smooth_power"]
+__all__ = ["clip", "limited", "rounded_power", "sign", "signed_power", "smooth_power"]
 
 
 @compiled
@@ -36,6 +36,12 @@ def rounded_power(value: float, exponent: float, width: float) -> tuple[float, f
 def smooth_power(value: float, exponent: float, phi: float) -> float:
     """`signed_power` with the sign smoothed to tanh(./phi), eqs. (7.23), (7.37)."""
     return math.pow(abs(value), exponent) * math.tanh(value / phi)
+
+
+@compiled
+def clip(value: float, low: float, high: float) -> float:
+    """``value`` limited to [low, high]."""
+    return min(max(value, low), high)
 
 
 @compiled

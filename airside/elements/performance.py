@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.link.compiled import compiled
 
 __all__ = ["EDGE", "bounded_transform", "bounded_transforms", "performance_transform", "performance_tube"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import nearest_turn, wrapped
 

@@ -44,7 +44,7 @@ from ftcc.airside.elements.filters import (
 )
 from ftcc.airside.elements.neighbours import error_sums, filtered_error_sums
 from ftcc.airside.elements.networks import adaptation_rate, diagonal_energy, grid_axis_energy, learned_gain
-from ftcc.airside.elements.nonlinear import smooth_power
+from ftcc.airside.elements.nonlinear import clip, smooth_power
 from ftcc.airside.elements.observers import discrete_disturbance_observer_step
 from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.vectors import (
@@ -60,7 +60,7 @@ from ftcc.airside.elements.vectors import (
     turned,
 )
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, clip
+from ftcc.airside.model import Model
 from ftcc.airside.references.attitude import Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
 from ftcc.link.compiled import Room, Vector, compiled

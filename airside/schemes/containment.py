@@ -24,10 +24,11 @@ from ftcc.airside import ranges
 from ftcc.airside.conditions import above_leaders_climb, largest_degree, stable_in_steps, weighted
 from ftcc.airside.elements.filters import high_gain_observer, reference_shaper
 from ftcc.airside.elements.neighbours import disagreement
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.airside.elements.observers import disturbance_observer_rate, sliding_mode_observer
 from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, airspeed_model, clip, flight_path_model, pitch_rate_model
+from ftcc.airside.model import Model, airspeed_model, flight_path_model, pitch_rate_model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption

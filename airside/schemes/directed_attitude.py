@@ -37,6 +37,7 @@ from ftcc.airside.conditions import bounds_errors, stable_in_steps
 from ftcc.airside.elements.filters import second_order_reference_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.saturation import vector_auxiliary_step
 from ftcc.airside.elements.vectors import (
@@ -52,7 +53,7 @@ from ftcc.airside.elements.vectors import (
     times,
 )
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, clip
+from ftcc.airside.model import Model
 from ftcc.airside.references.attitude import Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
 from ftcc.link.compiled import Room, Vector, compiled

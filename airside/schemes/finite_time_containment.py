@@ -27,11 +27,11 @@ from ftcc.airside.conditions import largest_degree, stable_in_steps, weighted
 from ftcc.airside.elements.filters import butterworth, sliding_mode_differentiator
 from ftcc.airside.elements.neighbours import motion_sums
 from ftcc.airside.elements.networks import adaptation_step, diagonal_energy, learned_gain
-from ftcc.airside.elements.nonlinear import signed_power
+from ftcc.airside.elements.nonlinear import clip, signed_power
 from ftcc.airside.elements.observers import finite_time_observer
 from ftcc.airside.elements.saturation import squared_auxiliary_step
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, clip
+from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption

@@ -40,10 +40,10 @@ from ftcc.airside.elements.fractional import (
     remember,
     set_poles,
 )
-from ftcc.airside.elements.nonlinear import limited, rounded_power
+from ftcc.airside.elements.nonlinear import clip, limited, rounded_power
 from ftcc.airside.elements.observers import reference_system_step
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, clip
+from ftcc.airside.model import Model
 from ftcc.airside.point_mass import acceleration, commands_for, velocity
 from ftcc.airside.references.position import Fire, Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity

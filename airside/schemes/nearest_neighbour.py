@@ -28,11 +28,11 @@ from ftcc.airside.conditions import stable_in_steps
 from ftcc.airside.elements.actuators import leading_command, modelled_position
 from ftcc.airside.elements.filters import first_order_rate, second_order_reference_step
 from ftcc.airside.elements.neighbours import weighted_average
-from ftcc.airside.elements.nonlinear import limited
+from ftcc.airside.elements.nonlinear import clip, limited
 from ftcc.airside.elements.observers import disturbance_observer_rate
 from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, airspeed_model, clip, flight_path_model, pitch_rate_model
+from ftcc.airside.model import Model, airspeed_model, flight_path_model, pitch_rate_model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption

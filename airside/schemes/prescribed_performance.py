@@ -30,12 +30,12 @@ from ftcc.airside.elements.actuators import lead_filter
 from ftcc.airside.elements.filters import butterworth, complementary_rate, first_order_rate, limited_tracker
 from ftcc.airside.elements.neighbours import disagreement
 from ftcc.airside.elements.networks import adaptation_rate, grid_axis_energy, learned_gain
-from ftcc.airside.elements.nonlinear import limited
+from ftcc.airside.elements.nonlinear import clip, limited
 from ftcc.airside.elements.observers import sliding_mode_observer, unexplained_acceleration
 from ftcc.airside.elements.performance import performance_transform, performance_tube
 from ftcc.airside.elements.saturation import auxiliary_step
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model, clip
+from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption

@@ -7,7 +7,7 @@ loops; integrators find the trim that a fault or a disturbance has moved.
 from typing import Annotated, NamedTuple
 
 from ftcc.airside import ranges
-from ftcc.airside.model import clip
+from ftcc.airside.elements.nonlinear import clip
 from ftcc.airside.scheme import Quantity
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
