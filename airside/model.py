@@ -1,67 +1,35 @@
 """The nominal model that a law knows: control-oriented longitudinal dynamics and the limits of its actuators.
 
-`attitude_model` has the rest of it. No elevator lift and no T sin(alpha): the laws treat both as disturbances, as the
-monograph does.
+`attitude_model` has the rest of it. `ftcc.sim.airframe` has the true equations: they stand twice on purpose, and a law
+sees its own alone. No elevator lift and no T sin(alpha) here: the laws treat both as disturbances, as the monograph
+does.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from ftcc.airside.elements.nonlinear import clip
+from ftcc.link.airframe import Airframe, with_inherited_fields
 from ftcc.link.compiled import compiled
 
 __all__ = ["Model", "airspeed_model", "flight_path_model", "level_deflections", "pitch_rate_model"]
 
 
-class Model(NamedTuple):
-    """Nominal parameters (SI units, rad) and limits."""
+@with_inherited_fields
+class Model(Airframe):
+    """The nominal parameters of an aircraft, and the limits of its actuators: thrust in N, deflections in rad."""
 
-    m: float
-    S: float
-    c: float
-    Iy: float
-    rho: float
-    g: float
-    CD0: float
-    CDa: float
-    CDa2: float
-    CL0: float
-    CLa: float
-    CLde: float
-    Cm0: float
-    Cma: float
-    Cmde: float
-    Cmq: float
     thrust_min: float
     thrust_max: float
     elevator_min: float
     elevator_max: float
+    aileron_min: float
+    aileron_max: float
+    rudder_min: float
+    rudder_max: float
     lag: float
     """Bandwidth of the actuators, rad/s; 0 = none."""
-    aileron_min: float = 0.0
-    aileron_max: float = 0.0
-    rudder_min: float = 0.0
-    rudder_max: float = 0.0
-    b: float = 1.0
-    Ix: float = 1.0
-    Iz: float = 1.0
-    Ixz: float = 0.0
-    CY0: float = 0.0
-    CYb: float = 0.0
-    Cl0: float = 0.0
-    Clb: float = 0.0
-    Clda: float = 0.0
-    Cldr: float = 0.0
-    Clp: float = 0.0
-    Clr: float = 0.0
-    Cn0: float = 0.0
-    Cnb: float = 0.0
-    Cnda: float = 0.0
-    Cndr: float = 0.0
-    Cnp: float = 0.0
-    Cnr: float = 0.0
 
 
 @compiled

@@ -1,7 +1,10 @@
-"""The airframe: its coefficients and equations of motion, in six degrees of freedom and in the vertical plane.
+"""The true airframe: its equations of motion, in six degrees of freedom and in the vertical plane.
 
-The model is the monograph's (2.1)-(2.7). Both sets of equations are of the same aircraft: in its plane of symmetry,
-without aileron and rudder, `attitude_rates` gives what `longitudinal_rates` gives.
+The model is the monograph's (2.1)-(2.7), its coefficients are an `Airframe`. What laws know of the aircraft is not the
+truth: `ftcc.airside.model` and `ftcc.airside.attitude_model` state nominal equations a second time on purpose.
+
+Both sets of equations are of the same aircraft: in its plane of symmetry, without aileron and rudder, `attitude_rates`
+gives what `longitudinal_rates` gives.
 """
 
 from __future__ import annotations
@@ -10,56 +13,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from ftcc.link.airframe import Airframe
 from ftcc.link.compiled import compiled
 
 __all__ = ["Airframe", "Deflections", "attitude_rates", "longitudinal_rates", "scaled", "turning_rates"]
-
-
-class Airframe(NamedTuple):
-    """True parameters of a fixed-wing aircraft (SI units, rad). Body axes: forward, right, down."""
-
-    m: float
-    """Mass, kg."""
-    S: float
-    """Wing area, m^2."""
-    c: float
-    """Mean aerodynamic chord, m."""
-    Iy: float
-    """Pitch moment of inertia, kg m^2."""
-    rho: float
-    """Air density, kg/m^3."""
-    g: float
-    """Gravity, m/s^2."""
-    CD0: float
-    CDa: float
-    CDa2: float
-    CL0: float
-    CLa: float
-    CLde: float
-    Cm0: float
-    Cma: float
-    Cmde: float
-    Cmq: float
-    b: float
-    """Span, m."""
-    Ix: float
-    Iz: float
-    Ixz: float
-    """Moments and product of inertia, kg m^2."""
-    CY0: float
-    CYb: float
-    Cl0: float
-    Clb: float
-    Clda: float
-    Cldr: float
-    Clp: float
-    Clr: float
-    Cn0: float
-    Cnb: float
-    Cnda: float
-    Cndr: float
-    Cnp: float
-    Cnr: float
 
 
 class Deflections(NamedTuple):

@@ -44,8 +44,15 @@ AIRFRAME = Airframe(
 )  # fmt: skip
 """The reference airframe."""
 
-NOMINAL = AIRFRAME[:16]
-"""What a law knows of it: the first fields of ``Model``."""
+
+def nominal(*, thrust: float = 40.0, elevator: float = 0.7, lag: float = 20.0, sideways: float = 0.0) -> Model:
+    """What a law knows of it: limits of 0 .. ``thrust`` N and +-``elevator``, +-``sideways`` rad, ``lag`` in rad/s."""
+    return Model(
+        **AIRFRAME._asdict(),
+        thrust_min=0.0, thrust_max=thrust, elevator_min=-elevator, elevator_max=elevator, lag=lag,
+        aileron_min=-sideways, aileron_max=sideways, rudder_min=-sideways, rudder_max=sideways,
+    )  # fmt: skip
+
 
 TRIM = (0.0, -0.19688, 0.0, 21.303)
 """Command in level flight at 30 m/s, in the order of ``ACTUATORS``; the angle of attack there is 0.03217 rad."""
@@ -113,7 +120,7 @@ def autopilot(uav: int = 1, form: str = "flight", **changes: Any) -> AutopilotSp
         "role": "leader" if leader else "follower",
         "scheme": "containment",
         "gains": tuple(scheme.gains(form, {})),
-        "model": Model(*NOMINAL, 0.0, 40.0, -0.7, 0.7, 20.0),
+        "model": nominal(),
         "command": vehicle().command,
         "travel": vehicle().travel,
         "reference": OwnReference((0.0, 30.0, 0.0, 0.0, 0.0, 0.0, 30.0)),

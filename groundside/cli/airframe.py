@@ -37,7 +37,7 @@ def airframe(
 ) -> None:
     """Show level trim and linear modes of an airframe, thrust and surfaces fixed."""
     from ftcc.groundside.scenario import load_airframe
-    from ftcc.groundside.schema import AirframeSheet
+    from ftcc.groundside.schema import AirframeSheet, record_of
     from ftcc.sim.airframe import Airframe, scaled
     from ftcc.sim.linear_modes import modes
     from ftcc.sim.trim import TrimError, trim
@@ -51,7 +51,7 @@ def airframe(
     sheet = load_airframe(name, Path("NAME"))
     if not isinstance(sheet, AirframeSheet):
         fail(f"airframe = {name!r}: is a point mass, which has no attitude to trim and no modes")
-    aircraft = Airframe(**{field: float(getattr(sheet, field)) for field in Airframe._fields})
+    aircraft = record_of(sheet, Airframe)
     try:
         aircraft = scaled(aircraft, _factors(coefficient or []))
     except ValueError as error:

@@ -18,7 +18,7 @@ from ftcc.airside.references.profiles import (
     trigger_rows,
 )
 from ftcc.groundside.scenario.checks import Findings
-from ftcc.groundside.schema import AirframeSheet, LeaderFields, Plan, PointMassSheet
+from ftcc.groundside.schema import AirframeSheet, LeaderFields, Plan, PointMassSheet, record_of
 from ftcc.link.graph import Graph
 from ftcc.sim.airframe import Airframe
 from ftcc.sim.trim import TrimError, steady_climb
@@ -103,7 +103,7 @@ def limited(
     if not profiles or plan.mission is None or not isinstance(sheet, AirframeSheet):
         return dict(profiles)
     V = plan.mission.V
-    airframe = Airframe(**{name: float(getattr(sheet, name)) for name in Airframe._fields})
+    airframe = record_of(sheet, Airframe)
     try:
         sink, climb = (steady_climb(airframe, V, force) for force in thrust)
     except TrimError as error:

@@ -13,8 +13,9 @@ from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.scenario.faults import actuator_faults, navigation_faults
 from ftcc.groundside.scenario.trims import level_trim
 from ftcc.groundside.scenario.wind import discrete_gusts, gust, mean_wind, turbulence
-from ftcc.groundside.schema import AirframeSheet, Damping, Lag, Plan, PointMassSheet, RateLimits
+from ftcc.groundside.schema import AirframeSheet, Damping, Lag, Plan, PointMassSheet, RateLimits, record_of
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST, in_slots
+from ftcc.link.airframe import PointMass
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
@@ -56,7 +57,8 @@ def nominal_model(plan: Plan, sheet: AirframeSheet | PointMassSheet, limits: Lim
     values = dict.fromkeys(Model._fields, 0.0)
     if isinstance(sheet, PointMassSheet):
         # (9.32) as a polar over the lift coefficient.
-        values |= {"CLa": 1.0, "CDa2": sheet.kd * sheet.kn**2 / sheet.g**2}
+        point = record_of(sheet, PointMass)
+        values |= {"CLa": 1.0, "CDa2": point.kd * point.kn**2 / point.g**2}
     values |= {name: float(getattr(sheet, name)) for name in Model._fields if name in type(sheet).model_fields}
     for name, slot in (("thrust", THRUST), ("elevator", ELEVATOR), ("aileron", AILERON), ("rudder", RUDDER)):
         values[f"{name}_min"], values[f"{name}_max"] = limits[slot]
@@ -72,7 +74,7 @@ def true_airframe(
     if missing:
         findings.refuse(f"airframe = {plan.airframe!r}: lacks {', '.join(missing)}, which the plant needs")
         findings.stop_if_refused()
-    airframe = plant.Parameters(**{name: float(getattr(sheet, name)) for name in plant.Parameters._fields})
+    airframe = record_of(sheet, plant.Parameters)
     try:
         airframe = scaled(airframe, plan.plant.coefficients)
     except ValueError as error:

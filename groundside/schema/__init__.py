@@ -3,7 +3,7 @@
 `scenario` reads the files and merges forms and variants; `mission` turns the result into what the processes are told.
 """
 
-from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, RateLimits, Start
+from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, RateLimits, Start, record_of
 from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.fire import PointMassSheet
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
@@ -30,4 +30,5 @@ __all__ = [
     "Strict",
     "TurbulenceFields",
     "fields_of",
+    "record_of",
 ]

@@ -3,54 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, Self
+from collections.abc import Callable
+from typing import Any, Literal, Self, TypeVar
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from ftcc.groundside.schema.base import Actuator, Id, NotNegative, Positive, Strict
+from ftcc.groundside.schema.base import Actuator, Id, Positive, Strict
+from ftcc.link.airframe import Airframe, PointMass, parameters
 
-__all__ = ["AirframeSheet", "Damping", "Lag", "Plant", "RateLimits", "Start", "Starts"]
+__all__ = ["AirframeSheet", "Damping", "Lag", "Plant", "RateLimits", "Start", "Starts", "record_of"]
 
 
+Sheet = TypeVar("Sheet", bound=Strict)
+Record = TypeVar("Record", Airframe, PointMass)
+
+
+def lists_parameters_of(record: Any) -> Callable[[type[Sheet]], type[Sheet]]:
+    """Class decorator: a sheet with a field for each parameter of a record of `ftcc.link.airframe`."""
+
+    def extend(sheet: type[Sheet]) -> type[Sheet]:
+        fields: Any = {
+            name: (
+                float,
+                Field(
+                    gt=parameter.above if math.isfinite(parameter.above) else None,
+                    ge=parameter.least if math.isfinite(parameter.least) else None,
+                    description=f"{parameter.unit}, {parameter.meaning}",
+                ),
+            )
+            for name, parameter in parameters(record).items()
+        }
+        return create_model(
+            sheet.__name__, __base__=sheet, __module__=sheet.__module__, __doc__=sheet.__doc__, **fields
+        )
+
+    return extend
+
+
+def record_of(sheet: BaseModel, record: type[Record]) -> Record:
+    """The parameters that a sheet holds as a record of `ftcc.link.airframe`."""
+    return record(**{name: float(getattr(sheet, name)) for name in record._fields})
+
+
+@lists_parameters_of(Airframe)
 class AirframeSheet(Strict):
-    """An airframe's coefficients (SI units, rad); the names are those of the monograph's (2.1)-(2.7)."""
+    """An airframe's coefficients: the fields of `Airframe`, by name."""
 
     title: str = ""
-    m: Positive
-    g: Positive
-    rho: Positive
-    S: Positive
-    c: Positive
-    b: Positive
-    Ix: Positive
-    Iy: Positive
-    Iz: Positive
-    Ixz: float
-    T_max: Positive
-    CL0: float
-    CLa: Positive
-    CLde: float
-    CD0: NotNegative
-    CDa: float
-    CDa2: float
-    Cm0: float
-    Cma: float
-    Cmde: float
-    Cmq: float
-    CY0: float
-    CYb: float
-    Cl0: float
-    Clb: float
-    Clda: float
-    Cldr: float
-    Clp: float
-    Clr: float
-    Cn0: float
-    Cnb: float
-    Cnda: float
-    Cndr: float
-    Cnp: float
-    Cnr: float
+    T_max: Positive = Field(description="N, full thrust of the engine, eq. (2.6)")
 
 
 class Lag(Strict):

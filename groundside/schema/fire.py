@@ -6,23 +6,19 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Id, NotNegative, Positive, Strict, check_end
+from ftcc.groundside.schema.aircraft import lists_parameters_of
+from ftcc.groundside.schema.base import Id, Positive, Strict, check_end
+from ftcc.link.airframe import PointMass
 
 __all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields"]
 
 
+@lists_parameters_of(PointMass)
 class PointMassSheet(Strict):
-    """An aircraft as a point (SI units); names as in the monograph's (9.32)."""
+    """An aircraft as a point: the fields of `PointMass`, by name."""
 
     title: str = ""
-    m: Positive
-    g: Positive
-    rho: Positive
-    S: Positive
-    T_max: Positive
-    CD0: NotNegative
-    kn: NotNegative
-    kd: NotNegative
+    T_max: Positive = Field(description="N, full thrust of the engine")
 
 
 class PostFields(Strict):

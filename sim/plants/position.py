@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from ftcc.link.airframe import PointMass
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import wrapped
 from ftcc.sim.plant import AIRSPEED, CHI, CLIMB, GAMMA, MU, NUMBER, THETA, V, X, Y, Z
@@ -75,18 +76,6 @@ class Disturbances(NamedTuple):
     wind_up: float = 0.0
 
 
-class Parameters(NamedTuple):
-    """SI units; names as in (9.32)."""
-
-    m: float
-    g: float
-    rho: float
-    S: float
-    CD0: float
-    kn: float
-    kd: float
-
-
 class Level(NamedTuple):
     """Level flight in still air."""
 
@@ -97,6 +86,7 @@ class Level(NamedTuple):
     """rad."""
 
 
+Parameters = PointMass
 ACTUATORS = ("thrust", "load_factor", "bank")
 COMPLETED = ("theta",)
 DISTURBANCES = (("b_x", "m/s^2"), ("b_y", "m/s^2"), ("b_z", "m/s^2"), *AIR_CHANNELS)

@@ -15,15 +15,10 @@ from ftcc.airside.attitude_model import (
     kinematics_inverse,
 )
 from ftcc.airside.elements.vectors import added, applied
-from ftcc.airside.model import Model
 from ftcc.sim.airframe import attitude_rates
-from tests.swarm import AIRFRAME
+from tests.swarm import AIRFRAME, nominal
 
-MODEL = Model(
-    **{name: value for name, value in AIRFRAME._asdict().items() if name in Model._fields},
-    thrust_min=0.0, thrust_max=120.0, elevator_min=-1.0, elevator_max=1.0, lag=20.0,
-    aileron_min=-1.0, aileron_max=1.0, rudder_min=-1.0, rudder_max=1.0,
-)  # fmt: skip
+MODEL = nominal(thrust=120.0, elevator=1.0, sideways=1.0)
 NO_LIFT = AIRFRAME._replace(CLde=0.0)
 STATES = [
     # V, gamma, mu, alpha, beta, p, q, r

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from ftcc.airside.flight_path import Own
-from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Reference
 from ftcc.airside.schemes import find
-from tests.swarm import AIRFRAME, FOLLOWERS, GRAPH, NOMINAL, Swarm
+from tests.swarm import AIRFRAME, FOLLOWERS, GRAPH, Swarm, nominal
 
 SCHEME = find("containment")
 LAW = SCHEME.module
-MODEL = Model(*NOMINAL, 0.0, 40.0, -0.7, 0.7, 20.0)
+MODEL = nominal()
 MISSION = Reference(0.0, 30.0, 0.0, 0.0, 0.0, 0.0)
 DT = 0.01
 

@@ -9,21 +9,16 @@ import pytest
 
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import LARGEST_BANK, hold_course
-from ftcc.airside.model import Model
 from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State
 from ftcc.sim.sensors import encode_state
 from ftcc.sim.trim import trim
-from tests.swarm import AIRFRAME, vehicle
+from tests.swarm import AIRFRAME, nominal, vehicle
 
 TRAVEL = 0.5
-MODEL = Model(
-    **{name: value for name, value in AIRFRAME._asdict().items() if name in Model._fields},
-    thrust_min=0.0, thrust_max=120.0, elevator_min=-0.8, elevator_max=0.8, lag=20.0,
-    aileron_min=-TRAVEL, aileron_max=TRAVEL, rudder_min=-TRAVEL, rudder_max=TRAVEL,
-)  # fmt: skip
+MODEL = nominal(thrust=120.0, elevator=0.8, sideways=TRAVEL)
 
 
 def flown(V: float, seconds: float, course: float = 0.0, **start: float) -> np.ndarray:

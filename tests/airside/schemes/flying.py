@@ -8,13 +8,13 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Reference
 from ftcc.link.graph import Graph
-from tests.swarm import NOMINAL
+from tests.swarm import nominal
 
 MISSION = Reference(0.0, 30.0, 0.0, 1000.0, 0.0, 0.0)
 
 
 def model(thrust: float, elevator: float, lag: float = 20.0) -> Model:
-    return Model(*NOMINAL, 0.0, thrust, -elevator, elevator, lag)
+    return nominal(thrust=thrust, elevator=elevator, lag=lag)
 
 
 def own(**values: float) -> Own:
