@@ -15,13 +15,41 @@ from ftcc.link.rotation import wrapped
 __all__ = [
     "attitude_drift",
     "attitude_error",
+    "attitude_of",
     "body_rate_model",
+    "body_rates_of",
     "deflections_for",
     "kinematics",
     "kinematics_inverse",
     "largest_deflections",
     "least_deflections",
+    "reference_rates_of",
+    "surfaces_of",
 ]
+
+
+@compiled
+def attitude_of(own):
+    """X1: bank, angle of attack and sideslip, rad."""
+    return own.mu, own.alpha, own.beta
+
+
+@compiled
+def body_rates_of(own):
+    """X2: roll, pitch and yaw rate, rad/s."""
+    return own.p, own.q, own.r
+
+
+@compiled
+def surfaces_of(own):
+    """Aileron, elevator and rudder as commanded, in force at present, rad."""
+    return own.aileron, own.elevator, own.rudder
+
+
+@compiled
+def reference_rates_of(reference):
+    """X1d': rates of the reference's bank, angle of attack and sideslip, rad/s."""
+    return reference.mu_dot, reference.alpha_dot, reference.beta_dot
 
 
 @compiled

@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.elements.nonlinear import clip, sign
+from ftcc.airside.elements.vectors import added, scaled, subtracted
 from ftcc.link.compiled import compiled
 
 __all__ = [
     "butterworth",
+    "butterworth_step",
     "complementary_rate",
     "critically_damped_step",
     "first_order_rate",
     "high_gain_observer",
+    "implicit_butterworth_step",
     "limited_tracker",
     "low_pass_step",
     "reference_shaper",
+    "robust_exact_differentiator_on_ramp",
     "robust_exact_differentiator_step",
     "second_order_reference_step",
     "sliding_mode_differentiator",
@@ -41,6 +45,29 @@ def butterworth(value, rate, target, w):
     (value', rate')
     """
     return rate, w * w * (target - value) - math.sqrt(2.0) * w * rate
+
+
+@compiled
+def butterworth_step(value, rate, target, w, h):
+    """`butterworth` of three axes after a step of length ``h``, semi-implicitly: the rate first, eq. (7.35).
+
+    Unstable from w h = sqrt(6) - sqrt(2) on.
+    """
+    _, first = butterworth(value[0], rate[0], target[0], w)
+    _, second = butterworth(value[1], rate[1], target[1], w)
+    _, third = butterworth(value[2], rate[2], target[2], w)
+    rate = added(rate, scaled(h, (first, second, third)))
+    return added(value, scaled(h, rate)), rate
+
+
+@compiled
+def implicit_butterworth_step(value, rate, target, w, h):
+    """`butterworth` of three axes after a step of length ``h``, implicitly, eq. (8.7): stable for every h."""
+    damping = math.sqrt(0.5)
+    first, first_rate = second_order_reference_step(value[0], rate[0], target[0], 0.0, w, damping, h)
+    second, second_rate = second_order_reference_step(value[1], rate[1], target[1], 0.0, w, damping, h)
+    third, third_rate = second_order_reference_step(value[2], rate[2], target[2], 0.0, w, damping, h)
+    return (first, second, third), (first_rate, second_rate, third_rate)
 
 
 @compiled
@@ -163,6 +190,23 @@ def robust_exact_differentiator_step(value, derivative, target, damping, cubic, 
     root = math.sqrt(size)
     derivative -= h * bound * ((0.5 + 1.5 * cubic * cubic * error * error) * smooth + 2.0 * cubic * error)
     return value + h * (derivative - damping * (root + cubic * size * root) * sign(error)), derivative
+
+
+@compiled
+def robust_exact_differentiator_on_ramp(value, derivative, before, target, damping, cubic, bound, phi, h, parts):
+    """`robust_exact_differentiator_step` of three axes, ``parts`` steps over ``h`` seconds.
+
+    Its input goes in a straight line from ``before`` to ``target``.
+    """
+    x, y, z = value
+    x_rate, y_rate, z_rate = derivative
+    part = h / parts
+    for n in range(1, parts + 1):
+        at = added(before, scaled(n / parts, subtracted(target, before)))
+        x, x_rate = robust_exact_differentiator_step(x, x_rate, at[0], damping, cubic, bound, phi, part)
+        y, y_rate = robust_exact_differentiator_step(y, y_rate, at[1], damping, cubic, bound, phi, part)
+        z, z_rate = robust_exact_differentiator_step(z, z_rate, at[2], damping, cubic, bound, phi, part)
+    return (x, y, z), (x_rate, y_rate, z_rate)
 
 
 @compiled

@@ -6,7 +6,7 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["clip", "limited", "rounded_power", "sign", "signed_power", "smooth_power"]
+__all__ = ["clip", "limited", "rounded_power", "sign", "signed_power", "smooth_power", "smooth_powers", "smooth_signs"]
 
 
 @compiled
@@ -36,6 +36,18 @@ def rounded_power(value: float, exponent: float, width: float) -> tuple[float, f
 def smooth_power(value: float, exponent: float, phi: float) -> float:
     """`signed_power` with the sign smoothed to tanh(./phi), eqs. (7.23), (7.37)."""
     return math.pow(abs(value), exponent) * math.tanh(value / phi)
+
+
+@compiled
+def smooth_powers(a, exponent, phi):
+    """`smooth_power` of three axes."""
+    return smooth_power(a[0], exponent, phi), smooth_power(a[1], exponent, phi), smooth_power(a[2], exponent, phi)
+
+
+@compiled
+def smooth_signs(a, phi):
+    """The sign of three axes, smoothed to tanh(./phi)."""
+    return math.tanh(a[0] / phi), math.tanh(a[1] / phi), math.tanh(a[2] / phi)
 
 
 @compiled

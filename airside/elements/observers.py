@@ -10,6 +10,7 @@ from ftcc.link.compiled import compiled
 
 __all__ = [
     "discrete_disturbance_observer_step",
+    "discrete_disturbance_observer_steps",
     "disturbance_observer_rate",
     "finite_time_observer",
     "reference_system_step",
@@ -43,6 +44,15 @@ def discrete_disturbance_observer_step(estimate, disturbance, measured, explaine
     error = measured - estimate
     after = estimate + h * (explained + disturbance) + (1.0 - pole * pole) * error
     return after, disturbance + (1.0 - pole) * (1.0 - pole) / h * error
+
+
+@compiled
+def discrete_disturbance_observer_steps(estimate, disturbance, measured, explained, w, h):
+    """`discrete_disturbance_observer_step` of three axes."""
+    x, d_x = discrete_disturbance_observer_step(estimate[0], disturbance[0], measured[0], explained[0], w, h)
+    y, d_y = discrete_disturbance_observer_step(estimate[1], disturbance[1], measured[1], explained[1], w, h)
+    z, d_z = discrete_disturbance_observer_step(estimate[2], disturbance[2], measured[2], explained[2], w, h)
+    return (x, y, z), (d_x, d_y, d_z)
 
 
 @compiled

@@ -30,22 +30,23 @@ from numpy.typing import NDArray
 from ftcc.airside import ranges
 from ftcc.airside.attitude_model import (
     attitude_error,
+    attitude_of,
     body_rate_model,
+    body_rates_of,
     deflections_for,
     kinematics,
     kinematics_inverse,
     largest_deflections,
     least_deflections,
+    reference_rates_of,
+    surfaces_of,
 )
 from ftcc.airside.conditions import bounds_errors, stable_in_steps
-from ftcc.airside.elements.filters import (
-    butterworth,
-    robust_exact_differentiator_step,
-)
+from ftcc.airside.elements.filters import butterworth_step, robust_exact_differentiator_on_ramp
 from ftcc.airside.elements.neighbours import error_sums, filtered_error_sums
 from ftcc.airside.elements.networks import adaptation_rate, diagonal_energy, grid_axis_energy, learned_gain
-from ftcc.airside.elements.nonlinear import clip, smooth_power
-from ftcc.airside.elements.observers import discrete_disturbance_observer_step
+from ftcc.airside.elements.nonlinear import clip, smooth_powers, smooth_signs
+from ftcc.airside.elements.observers import discrete_disturbance_observer_steps
 from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.vectors import (
     added,
@@ -63,6 +64,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.references.attitude import Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
+from ftcc.airside.vocabulary import ATTITUDE_TRACKING, angles, body_rates, surfaces
 from ftcc.link.compiled import Room, Vector, compiled
 from ftcc.link.graph import Assumption
 
@@ -192,40 +194,22 @@ class Output(NamedTuple):
 
 SHARED = {
     "follower": (
-        Q("mu_error", "rad", "tracking error, bank"),
-        Q("alpha_error", "rad", "tracking error, angle of attack"),
-        Q("beta_error", "rad", "tracking error, sideslip"),
-        Q("mu_error_rate", "rad/s", "used without a neighbour filter only"),
-        Q("alpha_error_rate", "rad/s", "used without a neighbour filter only"),
-        Q("beta_error_rate", "rad/s", "used without a neighbour filter only"),
+        *angles("{}_error", "rad", "tracking error, {}"),
+        *angles("{}_error_rate", "rad/s", "used without a neighbour filter only"),
     ),
     "leader": (),
 }
 SIGNALS = (
-    Q("mu_d", "rad", "reference, bank"),
-    Q("alpha_d", "rad", "reference, angle of attack"),
-    Q("beta_d", "rad", "reference, sideslip"),
-    Q("E_mu", "rad", "synchronization error, bank", bound="wall"),
-    Q("E_alpha", "rad", "synchronization error, angle of attack", bound="wall"),
-    Q("E_beta", "rad", "synchronization error, sideslip", bound="wall"),
+    *angles("{}_d", "rad", "reference, {}"),
+    *angles("E_{}", "rad", "synchronization error, {}", bound="wall"),
     Q("wall", "rad", "upper wall of the funnel"),
-    Q("p_d", "rad/s", "differentiated rate command, roll"),
-    Q("q_d", "rad/s", "differentiated rate command, pitch"),
-    Q("r_d", "rad/s", "differentiated rate command, yaw"),
+    *body_rates("{}_d", "rad/s", "differentiated rate command, {}"),
     Q("theta1", "-", "squared norm of the first network's weights"),
     Q("theta2", "-", "squared norm of the second network's weights"),
-    Q("d_p", "rad/s^2", "unexplained roll acceleration"),
-    Q("d_q", "rad/s^2", "unexplained pitch acceleration"),
-    Q("d_r", "rad/s^2", "unexplained yaw acceleration"),
-    Q("aileron_wanted", "rad", "aileron before its limits"),
-    Q("elevator_wanted", "rad", "elevator before its limits"),
-    Q("rudder_wanted", "rad", "rudder before its limits"),
+    *body_rates("d_{}", "rad/s^2", "unexplained {} acceleration"),
+    *surfaces("{}_wanted", "rad", "{} before its limits"),
 )
-TRACKING = (
-    Q("wrapped(mu - mu_d)", "rad", "bank off its reference", bound=math.radians(3.0)),
-    Q("alpha - alpha_d", "rad", "angle of attack off its reference", bound=math.radians(3.0)),
-    Q("beta - beta_d", "rad", "sideslip off its reference", bound=math.radians(3.0)),
-)
+TRACKING = ATTITUDE_TRACKING
 GRAPH = Assumption.CONNECTED_UNDIRECTED
 COMMANDS = ("aileron", "elevator", "rudder")
 PLANT = "attitude"
@@ -264,39 +248,80 @@ _DYNAMIC_SURFACE = 0.05
 _FASTEST_OBSERVER, _SLOWEST_OBSERVER, _FASTEST_NEIGHBOURS = 0.4, 10.0, 20.0
 """Where trouble begins, see `_sampled_well`: share of the control rate; rad/s; rad/s."""
 _FASTEST_LOW_PASS = math.sqrt(6.0) - math.sqrt(2.0)
-"""w h at which the semi-implicit steps of (7.35) become unstable: 4 = 2 sqrt(2) w h + (w h)^2."""
+"""w h at which the steps of (7.35) become unstable: 4 = 2 sqrt(2) w h + (w h)^2."""
 _ZERO = (0.0, 0.0, 0.0)
+
+# The networks, all chosen: what counts as 1 in an input, how far an input counts, and where the neurons are.
+_ANGLE_SCALE = (0.3, 0.2, 0.1)
+"""rad; body rates count in rad/s."""
+_COMMAND_SCALE = (0.6, 0.6, 0.6)
+"""rad."""
+_LEAST_INPUT, _LARGEST_INPUT = (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5)
+_ANGLE_NODES, _ANGLE_WIDTH = 3, 2.0
+"""First network: nodes per axis of its grid, and their width."""
+_RATE_NODES, _RATE_WIDTH = 61, 6.0
+"""Second network: nodes on its diagonal, and their width."""
+
+
+class _Error(NamedTuple):
+    """Synchronization error of a tick, and its funnel."""
+
+    E: Vector
+    """(7.12), rad."""
+    phi: float
+    """Share of the own error in it: lambda1 + lambda2 sum_j a_ij."""
+    neighbours: Vector
+    """sum_j a_ij e_j', rad/s."""
+    eps: float
+    """Funnel (7.16), rad."""
+    eps_rate: float
+    xi: Vector
+    """Transformed error (7.20)."""
+    eta: Vector
+    """Its slope, 1/rad."""
+
+
+class _Nominal(NamedTuple):
+    """The nominal model at the present attitude: X1' = F1 + G1 X2, X2' = F2 + G2 U."""
+
+    G1: tuple[Vector, Vector, Vector]
+    G1_inverse: tuple[Vector, Vector, Vector]
+    F2: Vector
+    G2: tuple[Vector, Vector, Vector]
+
+
+@compiled
+def _k11(gains):
+    return gains.k11_mu, gains.k11_alpha, gains.k11_beta
+
+
+@compiled
+def _k12(gains):
+    return gains.k12_mu, gains.k12_alpha, gains.k12_beta
+
+
+@compiled
+def _k21(gains):
+    return gains.k21_p, gains.k21_q, gains.k21_r
+
+
+@compiled
+def _k22(gains):
+    return gains.k22_p, gains.k22_q, gains.k22_r
 
 
 @compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: the published zeros, the body rates as measured, the surfaces at their command."""
-    rates, deflections = (own.p, own.q, own.r), (own.aileron, own.elevator, own.rudder)
-    e = attitude_error(own, reference)
     return State(
         t=own.t, began=own.t, ticks=0.0,
-        e=e, e_dot=_ZERO, F1=_ZERO,
+        e=attitude_error(own, reference), e_dot=_ZERO, F1=_ZERO,
         x2_bar=_ZERO, x2_d=_ZERO, w=_ZERO,
         z1=_ZERO, z2=_ZERO, theta1=0.0, theta2=0.0,
-        u=_ZERO, acting=deflections, u_f=_ZERO, u_f_dot=_ZERO,
-        x2_hat=rates, d=_ZERO,
+        u=_ZERO, acting=surfaces_of(own), u_f=_ZERO, u_f_dot=_ZERO,
+        x2_hat=body_rates_of(own), d=_ZERO,
         neighbours=0.0,  # type: ignore[arg-type]
     )  # fmt: skip
-
-
-@compiled
-def _smooth_powers(a, gains):
-    """sig(a)^upsilon of (7.23), axis by axis."""
-    return (
-        smooth_power(a[0], gains.upsilon, gains.phi_s),
-        smooth_power(a[1], gains.upsilon, gains.phi_s),
-        smooth_power(a[2], gains.upsilon, gains.phi_s),
-    )
-
-
-@compiled
-def _smooth_signs(a, phi):
-    return math.tanh(a[0] / phi), math.tanh(a[1] / phi), math.tanh(a[2] / phi)
 
 
 @compiled
@@ -305,175 +330,195 @@ def _capped(gain, cap):
 
 
 @compiled
+def _synchronization_error(state, own, e, heard, gains, dt):
+    """Synchronization error (7.12), funnel (7.16) and transformed error (7.20)."""
+    if gains.neighbour_filter > 0.0:
+        weights, differences, rates = filtered_error_sums(
+            e, heard, state.neighbours, gains.neighbour_filter, gains.oldest, dt
+        )
+    else:
+        weights, differences, rates = error_sums(e, heard, gains.oldest)
+    E = added(scaled(gains.lambda1, e), scaled(gains.lambda2, differences))
+    eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.nu)
+    xi, eta = bounded_transforms(E, eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
+    phi = gains.lambda1 + gains.lambda2 * weights
+    return _Error(E=E, phi=phi, neighbours=rates, eps=eps, eps_rate=eps_rate, xi=xi, eta=eta)
+
+
+@compiled
+def _nominal(own, beta, model):
+    """The model, with the airspeed and the sideslip ``beta`` (rad) guarded."""
+    V = max(own.V, _LEAST_AIRSPEED)
+    F2, G2 = body_rate_model(V, own.alpha, own.beta, body_rates_of(own), V, model)
+    return _Nominal(G1=kinematics(own.alpha, beta), G1_inverse=kinematics_inverse(own.alpha, beta), F2=F2, G2=G2)
+
+
+@compiled
+def _acting_surfaces(state, own, gains, dt):
+    """Modelled position of the surfaces; without a lag their command."""
+    command = surfaces_of(own)
+    if gains.lag > 0.0:
+        return added(state.acting, scaled(1.0 - math.exp(-gains.lag * dt), subtracted(command, state.acting)))
+    return command
+
+
+@compiled
+def _unexplained_acceleration(state, x2, nominal, acting, gains, dt):
+    """Observer of the body rates, and the acceleration that the model does not explain."""
+    if gains.observer == 0.0 or state.ticks == 0.0:
+        return state.x2_hat, state.d
+    explained = added(nominal.F2, applied(nominal.G2, acting))
+    return discrete_disturbance_observer_steps(state.x2_hat, state.d, x2, explained, gains.observer, dt)
+
+
+@compiled
+def _feed_forward(state, e, x2, reference_rate, nominal, gains, dt):
+    """Filtered rate of the tracking error, and the attitude's rate that the body rates do not explain."""
+    e_dot, F1 = state.e_dot, state.F1
+    if gains.feed_forward == 0.0:
+        return e_dot, F1
+    share_of_new = 1.0
+    if state.ticks > 0.0:
+        difference = scaled(1.0 / dt, turned(e, state.e))
+        e_dot = added(e_dot, scaled(1.0 - math.exp(-dt / _RATE_FILTER), subtracted(difference, e_dot)))
+        share_of_new = 1.0 - math.exp(-dt / _FEED_FORWARD_FILTER)
+    seen = subtracted(added(e_dot, reference_rate), applied(nominal.G1, x2))
+    return e_dot, added(F1, scaled(share_of_new, subtracted(seen, F1)))
+
+
+@compiled
+def _network_inputs(a, scale):
+    return limited_to(over(a, scale), _LEAST_INPUT, _LARGEST_INPUT)
+
+
+@compiled
 def _network_energies(own, u_f):
     """phi'phi of the two networks, each with a constant neuron."""
-    mu, alpha, beta = clip(own.mu / 0.3, -1.5, 1.5), clip(own.alpha / 0.2, -1.5, 1.5), clip(own.beta / 0.1, -1.5, 1.5)
-    attitude = grid_axis_energy(mu, 3, 2.0) * grid_axis_energy(alpha, 3, 2.0) * grid_axis_energy(beta, 3, 2.0)
-    rates = diagonal_energy(
-        (
-            mu,
-            alpha,
-            beta,
-            clip(own.p, -1.5, 1.5),
-            clip(own.q, -1.5, 1.5),
-            clip(own.r, -1.5, 1.5),
-            clip(u_f[0] / 0.6, -1.5, 1.5),
-            clip(u_f[1] / 0.6, -1.5, 1.5),
-            clip(u_f[2] / 0.6, -1.5, 1.5),
-        ),
-        61,
-        6.0,
+    mu, alpha, beta = _network_inputs(attitude_of(own), _ANGLE_SCALE)
+    energy = (
+        grid_axis_energy(mu, _ANGLE_NODES, _ANGLE_WIDTH)
+        * grid_axis_energy(alpha, _ANGLE_NODES, _ANGLE_WIDTH)
+        * grid_axis_energy(beta, _ANGLE_NODES, _ANGLE_WIDTH)
     )
-    return 1.0 + attitude, 1.0 + rates
+    rates = limited_to(body_rates_of(own), _LEAST_INPUT, _LARGEST_INPUT)
+    inputs = (mu, alpha, beta, *rates, *_network_inputs(u_f, _COMMAND_SCALE))
+    return 1.0 + energy, 1.0 + diagonal_energy(inputs, _RATE_NODES, _RATE_WIDTH)
+
+
+@compiled
+def _rate_command(state, error, reference_rate, F1, nominal, energy, gains):
+    """Virtual rate command X2_bar (7.23)."""
+    S1 = subtracted(error.xi, state.z1)
+    damping = learned_gain(state.theta1, energy, gains.h11) + 1.0 / (2.0 * gains.h12 * gains.h12)
+    eta = error.eta
+    added_gain = (
+        _capped(eta[0] * eta[0] * damping, gains.cap1),
+        _capped(eta[1] * eta[1] * damping, gains.cap1),
+        _capped(eta[2] * eta[2] * damping, gains.cap1),
+    )
+    pull = added(times(_k11(gains), error.xi), times(added_gain, S1))
+    pull = added(pull, times(_k12(gains), smooth_powers(S1, gains.upsilon, gains.phi_s)))
+    wanted = subtracted(reference_rate, over(pull, eta))
+    wanted = added(wanted, scaled(gains.lambda2 / error.phi, error.neighbours))
+    wanted = subtracted(added(wanted, scaled(error.eps_rate / (error.eps * error.phi), error.E)), F1)
+    return applied(nominal.G1_inverse, wanted)
 
 
 @compiled
 def _differentiated(state, x2_bar, gains, dt):
-    """X2d and w at this tick: (7.24) from the tick before, its input on a ramp."""
-    p, q, r = state.x2_d
-    w_p, w_q, w_r = state.w
-    parts = int(gains.substeps)
-    h = dt / parts
-    a, b, c, phi = gains.h13, gains.h14, gains.h15, gains.phi_s
-    for n in range(1, parts + 1):
-        target = added(state.x2_bar, scaled(n / parts, subtracted(x2_bar, state.x2_bar)))
-        p, w_p = robust_exact_differentiator_step(p, w_p, target[0], a, b, c, phi, h)
-        q, w_q = robust_exact_differentiator_step(q, w_q, target[1], a, b, c, phi, h)
-        r, w_r = robust_exact_differentiator_step(r, w_r, target[2], a, b, c, phi, h)
-    return (p, q, r), (w_p, w_q, w_r)
+    """X2_d and w at this tick: (7.24) from the tick before, its input on a ramp."""
+    if state.ticks == 0.0:
+        return state.x2_d, state.w
+    return robust_exact_differentiator_on_ramp(
+        state.x2_d, state.w, state.x2_bar, x2_bar,
+        gains.h13, gains.h14, gains.h15, gains.phi_s, dt, int(gains.substeps),
+    )  # fmt: skip
 
 
 @compiled
-def _auxiliary(state, xi, eta, S2, er, phi_i, G1, energies, gains, dt):
+def _wanted_deflections(state, x2, x2_d, w, d, nominal, energy, gains):
+    """Deflections U before their limits, and the rate error S2, (7.37)."""
+    S2 = subtracted(subtracted(x2, x2_d), state.z2)
+    damping = learned_gain(state.theta2, energy, gains.h21) + 1.0 / (2.0 * gains.h22 * gains.h22)
+    pull = added(times(_k21(gains), subtracted(x2, x2_d)), d)
+    pull = added(pull, times(_k22(gains), smooth_powers(S2, gains.upsilon, gains.phi_s)))
+    pull = added(pull, scaled(_capped(damping, gains.cap2), S2))
+    return deflections_for(nominal.G2, subtracted(subtracted(w, nominal.F2), pull)), S2
+
+
+@compiled
+def _adapted(state, error, S2, er, nominal, energies, gains, dt):
     """z1, z2 (7.25), (7.38) and Theta_1, Theta_2 (7.34), (7.45) a tick later, in Euler steps; the rest is held."""
     z1, z2, theta1, theta2 = state.z1, state.z2, state.theta1, state.theta2
-    k11 = (gains.k11_mu, gains.k11_alpha, gains.k11_beta)
-    k21 = (gains.k21_p, gains.k21_q, gains.k21_r)
+    phi, eta, G1 = error.phi, error.eta, nominal.G1
     parts = int(gains.substeps)
     h = dt / parts
     rate_error = math.sqrt(dot(S2, S2))
     for _ in range(parts):
-        weighted = times(subtracted(xi, z1), eta)
-        z1_rate = subtracted(times(eta, applied(G1, added(er, z2))), times(k11, z1))
-        z1_rate = scaled(phi_i, subtracted(z1_rate, scaled(gains.tau1, _smooth_signs(z1, gains.phi_s))))
-        z2_rate = subtracted(scaled(phi_i * gains.k_zeta, applied_transposed(G1, weighted)), times(k21, z2))
-        z2_rate = subtracted(z2_rate, scaled(gains.tau2, _smooth_signs(z2, gains.phi_s)))
-        error = math.sqrt(dot(weighted, weighted))
-        theta1 += h * adaptation_rate(theta1, error, energies[0], gains.h11, gains.k13, gains.k14)
+        weighted = times(subtracted(error.xi, z1), eta)
+        z1_rate = subtracted(times(eta, applied(G1, added(er, z2))), times(_k11(gains), z1))
+        z1_rate = scaled(phi, subtracted(z1_rate, scaled(gains.tau1, smooth_signs(z1, gains.phi_s))))
+        z2_rate = subtracted(scaled(phi * gains.k_zeta, applied_transposed(G1, weighted)), times(_k21(gains), z2))
+        z2_rate = subtracted(z2_rate, scaled(gains.tau2, smooth_signs(z2, gains.phi_s)))
+        attitude_norm = math.sqrt(dot(weighted, weighted))
+        theta1 += h * adaptation_rate(theta1, attitude_norm, energies[0], gains.h11, gains.k13, gains.k14)
         theta2 += h * adaptation_rate(theta2, rate_error, energies[1], gains.h21, gains.k23, gains.k24)
         z1, z2 = added(z1, scaled(h, z1_rate)), added(z2, scaled(h, z2_rate))
     return z1, z2, theta1, theta2
 
 
 @compiled
-def _traditional(state, E, rates_sum, phi_i, reference_rate, x2, F20, G20, own, gains, dt):
-    """Dynamic surface control without funnel, networks and auxiliary systems: X2_bar, X2_d and U."""
-    k11 = (gains.k11_mu, gains.k11_alpha, gains.k11_beta)
-    k21 = (gains.k21_p, gains.k21_q, gains.k21_r)
-    wanted = added(subtracted(reference_rate, times(k11, E)), scaled(gains.lambda2 / phi_i, rates_sum))
+def _traditional(state, own, error, reference_rate, nominal, gains, dt):
+    """Dynamic surface control without funnel, networks and auxiliary systems: X2_bar, X2_d and U before its limits."""
+    wanted = added(
+        subtracted(reference_rate, times(_k11(gains), error.E)), scaled(gains.lambda2 / error.phi, error.neighbours)
+    )
     x2_bar = applied(kinematics_inverse(own.alpha, own.beta), wanted)
     x2_d = x2_bar
     if state.ticks > 0.0:
         x2_d = added(x2_bar, scaled(math.exp(-dt / _DYNAMIC_SURFACE), subtracted(state.x2_d, x2_bar)))
-    acceleration = subtracted(scaled(1.0 / _DYNAMIC_SURFACE, subtracted(x2_bar, x2_d)), F20)
-    acceleration = subtracted(acceleration, times(k21, subtracted(x2, x2_d)))
-    return x2_bar, x2_d, deflections_for(G20, acceleration)
+    acceleration = subtracted(scaled(1.0 / _DYNAMIC_SURFACE, subtracted(x2_bar, x2_d)), nominal.F2)
+    acceleration = subtracted(acceleration, times(_k21(gains), subtracted(body_rates_of(own), x2_d)))
+    return x2_bar, x2_d, deflections_for(nominal.G2, acceleration)
+
+
+@compiled
+def _sent(state, u, low, high, gains, dt):
+    """The command ``u`` with a lead against the surfaces' lag, within the limits."""
+    if gains.lag == 0.0 or state.ticks == 0.0:
+        return u
+    decay = math.exp(-gains.lag * dt)
+    return limited_to(added(u, scaled(decay / (1.0 - decay), subtracted(u, state.u))), low, high)
 
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
     """One tick: the state ``dt`` later, and what is commanded and seen now."""
-    first = state.ticks == 0.0
-    V = max(own.V, _LEAST_AIRSPEED)
-    beta = clip(own.beta, -_LARGEST_SIDESLIP, _LARGEST_SIDESLIP)
-    x2 = (own.p, own.q, own.r)
-    reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
-
-    # Synchronization error (7.12) and funnel (7.16), (7.20).
-    e = attitude_error(own, reference)
-    if gains.neighbour_filter > 0.0:
-        weights, differences, rates_sum = filtered_error_sums(
-            e, heard, state.neighbours, gains.neighbour_filter, gains.oldest, dt
-        )
-    else:
-        weights, differences, rates_sum = error_sums(e, heard, gains.oldest)
-    phi_i = gains.lambda1 + gains.lambda2 * weights
-    E = added(scaled(gains.lambda1, e), scaled(gains.lambda2, differences))
-    eps, eps_rate = performance_tube(own.t - state.began, gains.eps0, gains.eps_inf, gains.nu)
-    xi, eta = bounded_transforms(E, eps, gains.k_lo, gains.k_up, gains.edge, 1.0)
-
-    G1 = kinematics(own.alpha, beta)
-    F20, G20 = body_rate_model(V, own.alpha, own.beta, x2, V, model)
-
-    # What the model does not explain of the body rates.
-    acting = (own.aileron, own.elevator, own.rudder)
-    if gains.lag > 0.0:
-        acting = added(state.acting, scaled(1.0 - math.exp(-gains.lag * dt), subtracted(acting, state.acting)))
-    x2_hat, d = state.x2_hat, state.d
-    if gains.observer > 0.0 and not first:
-        explained = added(F20, applied(G20, acting))
-        p_hat, d_p = discrete_disturbance_observer_step(x2_hat[0], d[0], x2[0], explained[0], gains.observer, dt)
-        q_hat, d_q = discrete_disturbance_observer_step(x2_hat[1], d[1], x2[1], explained[1], gains.observer, dt)
-        r_hat, d_r = discrete_disturbance_observer_step(x2_hat[2], d[2], x2[2], explained[2], gains.observer, dt)
-        x2_hat, d = (p_hat, q_hat, r_hat), (d_p, d_q, d_r)
-
-    # What body rates do not explain of the attitude's rate.
-    e_dot, F1 = state.e_dot, state.F1
-    if gains.feed_forward > 0.0:
-        if not first:
-            difference = scaled(1.0 / dt, turned(e, state.e))
-            e_dot = added(e_dot, scaled(1.0 - math.exp(-dt / _RATE_FILTER), subtracted(difference, e_dot)))
-        seen = subtracted(added(e_dot, reference_rate), applied(G1, x2))
-        share_of_new = 1.0 if first else 1.0 - math.exp(-dt / _FEED_FORWARD_FILTER)
-        F1 = added(F1, scaled(share_of_new, subtracted(seen, F1)))
+    e, x2, reference_rate = attitude_error(own, reference), body_rates_of(own), reference_rates_of(reference)
+    error = _synchronization_error(state, own, e, heard, gains, dt)
+    nominal = _nominal(own, clip(own.beta, -_LARGEST_SIDESLIP, _LARGEST_SIDESLIP), model)
+    acting = _acting_surfaces(state, own, gains, dt)
+    x2_hat, d = _unexplained_acceleration(state, x2, nominal, acting, gains, dt)
+    e_dot, F1 = _feed_forward(state, e, x2, reference_rate, nominal, gains, dt)
 
     if gains.dynamic_surface > 0.0:
-        x2_bar, x2_d, wanted = _traditional(state, E, rates_sum, phi_i, reference_rate, x2, F20, G20, own, gains, dt)
+        x2_bar, x2_d, wanted = _traditional(state, own, error, reference_rate, nominal, gains, dt)
         w, z1, z2, theta1, theta2 = state.w, state.z1, state.z2, state.theta1, state.theta2
     else:
         energies = _network_energies(own, state.u_f)
+        x2_bar = _rate_command(state, error, reference_rate, F1, nominal, energies[0], gains)
+        x2_d, w = _differentiated(state, x2_bar, gains, dt)
+        wanted, S2 = _wanted_deflections(state, x2, x2_d, w, d, nominal, energies[1], gains)
+        er = subtracted(x2_d, x2_bar)
+        z1, z2, theta1, theta2 = _adapted(state, error, S2, er, nominal, energies, gains, dt)
 
-        # Virtual rate command (7.23).
-        S1 = subtracted(xi, state.z1)
-        damping = learned_gain(state.theta1, energies[0], gains.h11) + 1.0 / (2.0 * gains.h12 * gains.h12)
-        added_gain = (
-            _capped(eta[0] * eta[0] * damping, gains.cap1),
-            _capped(eta[1] * eta[1] * damping, gains.cap1),
-            _capped(eta[2] * eta[2] * damping, gains.cap1),
-        )
-        pull = added(times((gains.k11_mu, gains.k11_alpha, gains.k11_beta), xi), times(added_gain, S1))
-        pull = added(pull, times((gains.k12_mu, gains.k12_alpha, gains.k12_beta), _smooth_powers(S1, gains)))
-        wanted_rate = subtracted(reference_rate, over(pull, eta))
-        wanted_rate = added(wanted_rate, scaled(gains.lambda2 / phi_i, rates_sum))
-        wanted_rate = subtracted(added(wanted_rate, scaled(eps_rate / (eps * phi_i), E)), F1)
-        x2_bar = applied(kinematics_inverse(own.alpha, beta), wanted_rate)
-
-        # Differentiator (7.24).
-        x2_d, w = state.x2_d, state.w
-        if not first:
-            x2_d, w = _differentiated(state, x2_bar, gains, dt)
-
-        # Deflections (7.37).
-        S2 = subtracted(subtracted(x2, x2_d), state.z2)
-        damping = learned_gain(state.theta2, energies[1], gains.h21) + 1.0 / (2.0 * gains.h22 * gains.h22)
-        pull = added(times((gains.k21_p, gains.k21_q, gains.k21_r), subtracted(x2, x2_d)), d)
-        pull = added(pull, times((gains.k22_p, gains.k22_q, gains.k22_r), _smooth_powers(S2, gains)))
-        pull = added(pull, scaled(_capped(damping, gains.cap2), S2))
-        acceleration = subtracted(subtracted(w, F20), pull)
-        wanted = deflections_for(G20, acceleration)
-        z1, z2, theta1, theta2 = _auxiliary(
-            state, xi, eta, S2, subtracted(x2_d, x2_bar), phi_i, G1, energies, gains, dt
-        )
-
-    # Limits, lead, and the low-passed command that the second network sees next.
+    # Limits, lead, and the low-passed command (7.35) that the second network sees next.
     low, high = least_deflections(model), largest_deflections(model)
     u = limited_to(wanted, low, high)
-    sent = u
-    if gains.lag > 0.0 and not first:
-        decay = math.exp(-gains.lag * dt)
-        sent = limited_to(added(u, scaled(decay / (1.0 - decay), subtracted(u, state.u))), low, high)
-    u_f, u_f_dot = _low_passed(state.u_f, state.u_f_dot, sent, gains.w_u, dt)
+    sent = _sent(state, u, low, high, gains, dt)
+    u_f, u_f_dot = butterworth_step(state.u_f, state.u_f_dot, sent, gains.w_u, dt)
 
+    aileron, elevator, rudder = sent
     after = State(
         t=own.t, began=state.began, ticks=state.ticks + 1.0,
         e=e, e_dot=e_dot, F1=F1,
@@ -483,17 +528,11 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         x2_hat=x2_hat, d=d,
         neighbours=state.neighbours,
     )  # fmt: skip
-    return after, Output(sent[0], sent[1], sent[2], E, eps, F1, x2_bar, d, wanted)
-
-
-@compiled
-def _low_passed(value, rate, target, w, h):
-    """(7.35) a tick later, semi-implicitly: the rate first."""
-    _, p = butterworth(value[0], rate[0], target[0], w)
-    _, q = butterworth(value[1], rate[1], target[1], w)
-    _, r = butterworth(value[2], rate[2], target[2], w)
-    rate = added(rate, scaled(h, (p, q, r)))
-    return added(value, scaled(h, rate)), rate
+    output = Output(
+        aileron=aileron, elevator=elevator, rudder=rudder,
+        E=error.E, eps=error.eps, F1=F1, x2_bar=x2_bar, d=d, wanted=wanted,
+    )  # fmt: skip
+    return after, output
 
 
 @compiled

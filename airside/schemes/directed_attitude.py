@@ -26,15 +26,18 @@ from ftcc.airside import ranges
 from ftcc.airside.attitude_model import (
     attitude_drift,
     attitude_error,
+    attitude_of,
     body_rate_model,
+    body_rates_of,
     deflections_for,
     kinematics,
     kinematics_inverse,
     largest_deflections,
     least_deflections,
+    reference_rates_of,
 )
 from ftcc.airside.conditions import bounds_errors, stable_in_steps
-from ftcc.airside.elements.filters import second_order_reference_step
+from ftcc.airside.elements.filters import implicit_butterworth_step
 from ftcc.airside.elements.neighbours import error_sums
 from ftcc.airside.elements.networks import adapt_neuron
 from ftcc.airside.elements.nonlinear import clip
@@ -56,6 +59,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.references.attitude import Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
+from ftcc.airside.vocabulary import ATTITUDE_TRACKING, angles, body_rates, surfaces
 from ftcc.link.compiled import Room, Vector, compiled
 from ftcc.link.graph import Assumption, GraphError
 
@@ -163,43 +167,23 @@ class Output(NamedTuple):
 
 SHARED = {
     "follower": (
-        Q("mu_error", "rad", "attitude error, bank"),
-        Q("alpha_error", "rad", "attitude error, angle of attack"),
-        Q("beta_error", "rad", "attitude error, sideslip"),
-        Q("mu_error_rate", "rad/s", "its estimated rate"),
-        Q("alpha_error_rate", "rad/s", "its estimated rate"),
-        Q("beta_error_rate", "rad/s", "its estimated rate"),
+        *angles("{}_error", "rad", "attitude error, {}"),
+        *angles("{}_error_rate", "rad/s", "its estimated rate"),
     ),
     "leader": (),
 }
 SIGNALS = (
-    Q("mu_d", "rad", "reference, bank"),
-    Q("alpha_d", "rad", "reference, angle of attack"),
-    Q("beta_d", "rad", "reference, sideslip"),
-    Q("e_mu", "rad", "synchronization error, bank", bound="wall"),
-    Q("e_alpha", "rad", "synchronization error, angle of attack", bound="wall"),
-    Q("e_beta", "rad", "synchronization error, sideslip", bound="wall"),
+    *angles("{}_d", "rad", "reference, {}"),
+    *angles("e_{}", "rad", "synchronization error, {}", bound="wall"),
     Q("wall", "rad", "upper bound"),
-    Q("p_d", "rad/s", "filtered rate command, roll"),
-    Q("q_d", "rad/s", "filtered rate command, pitch"),
-    Q("r_d", "rad/s", "filtered rate command, yaw"),
-    Q("D1_mu", "rad/s", "estimated disturbance, bank"),
-    Q("D1_alpha", "rad/s", "estimated disturbance, angle of attack"),
-    Q("D1_beta", "rad/s", "estimated disturbance, sideslip"),
-    Q("D2_p", "rad/s^2", "estimated disturbance, roll rate"),
-    Q("D2_q", "rad/s^2", "estimated disturbance, pitch rate"),
-    Q("D2_r", "rad/s^2", "estimated disturbance, yaw rate"),
+    *body_rates("{}_d", "rad/s", "filtered rate command, {}"),
+    *angles("D1_{}", "rad/s", "estimated disturbance, {}"),
+    *body_rates("D2_{}", "rad/s^2", "estimated disturbance, {} rate"),
     Q("W1", "rad/s", "norm of the first network's weights"),
     Q("W2", "rad/s^2", "norm of the second network's weights"),
-    Q("aileron_wanted", "rad", "aileron before its limits"),
-    Q("elevator_wanted", "rad", "elevator before its limits"),
-    Q("rudder_wanted", "rad", "rudder before its limits"),
+    *surfaces("{}_wanted", "rad", "{} before its limits"),
 )
-TRACKING = (
-    Q("wrapped(mu - mu_d)", "rad", "bank off its reference", bound=math.radians(3.0)),
-    Q("alpha - alpha_d", "rad", "angle of attack off its reference", bound=math.radians(3.0)),
-    Q("beta - beta_d", "rad", "sideslip off its reference", bound=math.radians(3.0)),
-)
+TRACKING = ATTITUDE_TRACKING
 GRAPH = Assumption.NONE
 COMMANDS = ("aileron", "elevator", "rudder")
 PLANT = "attitude"
@@ -218,15 +202,27 @@ _STEEPEST, _LOST = 5.5, 6.8
 """Largest phi / (k eps_inf) flown with success behind surfaces of 20 rad/s, and the least that was lost, 1/rad."""
 _FASTEST_OBSERVER = 0.3
 """Largest k9 times the control period, see `_sampled_well`."""
-_DEGREES = math.radians(1.0)
-_BUTTERWORTH = math.sqrt(0.5)
 _ZERO = (0.0, 0.0, 0.0)
+
+# The networks, all chosen: what counts as 0 and as 1 in an input, how far an input counts, and the neurons' width.
+_DEGREES = math.radians(1.0)
+_TRIM = 4.0 * _DEGREES
+"""Angle of attack that counts as 0."""
+_ANGLE_SCALE = (20.0 * _DEGREES, 4.0 * _DEGREES, 4.0 * _DEGREES)
+_RATE_SCALE = (30.0 * _DEGREES, 20.0 * _DEGREES, 20.0 * _DEGREES)
+"""Per second."""
+_COMMAND_TRIM, _COMMAND_SCALE = -15.0 * _DEGREES, 30.0 * _DEGREES
+"""Elevator that counts as 0, and what counts as 1 of all three surfaces."""
+_LARGEST_INPUT = 3.0
+"""Of the second network."""
+_SPREAD = 8.0 * 1.2 * 1.2
+"""Of a neuron of the second network: its activation falls by 1/e at this squared distance."""
 
 
 @compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: predictions as measured, estimated disturbances 0, networks empty."""
-    x1, x2 = (own.mu, own.alpha, own.beta), (own.p, own.q, own.r)
+    x1, x2 = attitude_of(own), body_rates_of(own)
     return State(
         began=own.t, ticks=0.0,
         pi1=scaled(-gains.k2, x1), pi2=scaled(-gains.k9, x2), x1_hat=x1, x2_hat=x2,
@@ -238,8 +234,7 @@ def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gai
 @compiled
 def _adapt_first(W, own, error, gains, dt):
     """Output of the first network (before r1); its weights a tick later (8.27). 27 centres on the grid {-1, 0, 1}^3."""
-    unit = 4.0 * _DEGREES
-    mu, alpha, beta = own.mu / (20.0 * _DEGREES), (own.alpha - unit) / unit, own.beta / unit
+    mu, alpha, beta = over((own.mu, own.alpha - _TRIM, own.beta), _ANGLE_SCALE)
     output = _ZERO
     n = 0
     for i in range(-1, 2):
@@ -252,29 +247,33 @@ def _adapt_first(W, own, error, gains, dt):
 
 
 @compiled
+def _input(offset, scale):
+    return clip(offset / scale, -_LARGEST_INPUT, _LARGEST_INPUT)
+
+
+@compiled
 def _adapt_second(W, own, u_f, error, gains, dt):
     """Output of the second network (before r2); its weights a tick later (8.39). 17 centres: 0 and +-1 on each axis."""
-    unit, full = 4.0 * _DEGREES, 30.0 * _DEGREES
+    aileron, elevator, rudder = u_f
     inputs = (
-        clip((own.alpha - unit) / unit, -3.0, 3.0),
-        clip(own.beta / unit, -3.0, 3.0),
-        clip(own.p / full, -3.0, 3.0),
-        clip(own.q / (20.0 * _DEGREES), -3.0, 3.0),
-        clip(own.r / (20.0 * _DEGREES), -3.0, 3.0),
-        clip(u_f[0] / full, -3.0, 3.0),
-        clip((u_f[1] + 15.0 * _DEGREES) / full, -3.0, 3.0),
-        clip(u_f[2] / full, -3.0, 3.0),
+        _input(own.alpha - _TRIM, _ANGLE_SCALE[1]),
+        _input(own.beta, _ANGLE_SCALE[2]),
+        _input(own.p, _RATE_SCALE[0]),
+        _input(own.q, _RATE_SCALE[1]),
+        _input(own.r, _RATE_SCALE[2]),
+        _input(aileron, _COMMAND_SCALE),
+        _input(elevator - _COMMAND_TRIM, _COMMAND_SCALE),
+        _input(rudder, _COMMAND_SCALE),
     )
     square = 0.0
     for z in inputs:
         square += z * z
-    width = 8.0 * 1.2 * 1.2
-    output = adapt_neuron(W, 0, math.exp(-square / width), error, gains.k13, gains.k14, dt)
+    output = adapt_neuron(W, 0, math.exp(-square / _SPREAD), error, gains.k13, gains.k14, dt)
     n = 1
     for z in inputs:
         plus, minus = square - 2.0 * z + 1.0, square + 2.0 * z + 1.0
-        output = added(output, adapt_neuron(W, n, math.exp(-plus / width), error, gains.k13, gains.k14, dt))
-        output = added(output, adapt_neuron(W, n + 1, math.exp(-minus / width), error, gains.k13, gains.k14, dt))
+        output = added(output, adapt_neuron(W, n, math.exp(-plus / _SPREAD), error, gains.k13, gains.k14, dt))
+        output = added(output, adapt_neuron(W, n + 1, math.exp(-minus / _SPREAD), error, gains.k13, gains.k14, dt))
         n += 2
     return output
 
@@ -294,9 +293,9 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     first = state.ticks == 0.0
     V = max(own.V, _LEAST_AIRSPEED)
     # Where the measured bank jumps by a turn, prediction and observer go on.
-    x1, x2 = nearest_turns((own.mu, own.alpha, own.beta), state.x1_hat), (own.p, own.q, own.r)
-    reference_rate = (reference.mu_dot, reference.alpha_dot, reference.beta_dot)
-    weights_seen = _frobenius(state.W1), _frobenius(state.W2)
+    x1, x2 = nearest_turns(attitude_of(own), state.x1_hat), body_rates_of(own)
+    reference_rate = reference_rates_of(reference)
+    W1_norm, W2_norm = _frobenius(state.W1), _frobenius(state.W2)
 
     # Synchronization error (8.10) in its bound (8.12).
     error = attitude_error(own, reference)
@@ -354,7 +353,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     pi2_rate = subtracted(added(scaled(gains.k10, U2), e2), scaled(gains.k9, explained))
     mu1 = vector_auxiliary_step(state.mu1, gains.k5, phi * dot(steep, applied(g1, zeta1)), zeta1, gains.mu1_floor, dt)
     mu2 = vector_auxiliary_step(state.mu2, gains.k12, dot(e2, applied(g2, zeta2)), zeta2, gains.mu2_floor, dt)
-    u_f, u_f_dot = _low_passed(u0 if first else state.u_f, state.u_f_dot, u0, gains.w_u, dt)
+    u_f, u_f_dot = implicit_butterworth_step(u0 if first else state.u_f, state.u_f_dot, u0, gains.w_u, dt)
     after = State(
         began=state.began, ticks=state.ticks + 1.0,
         pi1=added(state.pi1, scaled(dt, pi1_rate)), pi2=added(state.pi2, scaled(dt, pi2_rate)),
@@ -364,17 +363,12 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         error_rate=subtracted(x1_hat_rate, reference_rate),
         W1=state.W1, W2=state.W2,
     )  # fmt: skip
-    shown = Output(u0[0], u0[1], u0[2], e, eps, D1, D2, weights_seen[0], weights_seen[1], wanted)
-    return after, shown
-
-
-@compiled
-def _low_passed(value, rate, target, w, dt):
-    """(8.7) a tick later, implicitly."""
-    a, a_rate = second_order_reference_step(value[0], rate[0], target[0], 0.0, w, _BUTTERWORTH, dt)
-    e, e_rate = second_order_reference_step(value[1], rate[1], target[1], 0.0, w, _BUTTERWORTH, dt)
-    r, r_rate = second_order_reference_step(value[2], rate[2], target[2], 0.0, w, _BUTTERWORTH, dt)
-    return (a, e, r), (a_rate, e_rate, r_rate)
+    aileron, elevator, rudder = u0
+    output = Output(
+        aileron=aileron, elevator=elevator, rudder=rudder,
+        e=e, eps=eps, D1=D1, D2=D2, W1=W1_norm, W2=W2_norm, wanted=wanted,
+    )  # fmt: skip
+    return after, output
 
 
 @compiled

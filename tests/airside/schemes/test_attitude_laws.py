@@ -14,9 +14,9 @@ import pytest
 
 from ftcc.airside.autopilots import build
 from ftcc.airside.compiled_stages import stages_of
+from ftcc.airside.elements.filters import butterworth_step
 from ftcc.airside.scheme import Flight
 from ftcc.airside.schemes import find
-from ftcc.airside.schemes.attitude_synchronization import _low_passed as low_passed
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.link.graph import Graph, GraphError
@@ -204,7 +204,7 @@ def test_what_cannot_be_sampled_well_is_said(law, gains, fatal, because):
 def test_the_limit_of_the_low_pass_is_that_of_its_steps(w, bounded):
     y, rate = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for _ in range(5000):
-        y, rate = low_passed(y, rate, (0.0, 0.0, 0.0), w, 0.005)
+        y, rate = butterworth_step(y, rate, (0.0, 0.0, 0.0), w, 0.005)
     assert (abs(y[0]) < 10.0) == bounded
 
 

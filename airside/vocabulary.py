@@ -1,0 +1,77 @@
+"""Quantities that several schemes name alike: those of three axes, the errors of attitude, longitudinal motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ftcc.airside.scheme import Quantity
+
+__all__ = [
+    "ACCELERATED_MOTION",
+    "ALTITUDE_MOTION",
+    "ATTITUDE_TRACKING",
+    "ELEVATOR_WANTED",
+    "LONGITUDINAL_DISTURBANCES",
+    "PLANE_MOTION",
+    "THRUST_WANTED",
+    "angles",
+    "body_rates",
+    "space",
+    "surfaces",
+]
+
+Q = Quantity
+
+
+def _each(
+    axes: Sequence[tuple[str, str]], name: str, unit: str, meaning: str, bound: float | str | None
+) -> tuple[Quantity, ...]:
+    return tuple(Q(name.format(symbol), unit, meaning.format(axis), bound=bound) for symbol, axis in axes)
+
+
+def angles(name: str, unit: str, meaning: str, bound: float | str | None = None) -> tuple[Quantity, ...]:
+    """A quantity of each angle of attitude; {} in its name stands for the symbol, in its meaning for the word."""
+    return _each((("mu", "bank"), ("alpha", "angle of attack"), ("beta", "sideslip")), name, unit, meaning, bound)
+
+
+def body_rates(name: str, unit: str, meaning: str, bound: float | str | None = None) -> tuple[Quantity, ...]:
+    """As `angles`, for the three body rates."""
+    return _each((("p", "roll"), ("q", "pitch"), ("r", "yaw")), name, unit, meaning, bound)
+
+
+def surfaces(name: str, unit: str, meaning: str, bound: float | str | None = None) -> tuple[Quantity, ...]:
+    """As `angles`, for the three surfaces."""
+    return _each([(word, word) for word in ("aileron", "elevator", "rudder")], name, unit, meaning, bound)
+
+
+def space(name: str, unit: str, meaning: str = "", bound: float | str | None = None) -> tuple[Quantity, ...]:
+    """As `angles`, for the three directions of space."""
+    return _each((("x", "north"), ("y", "east"), ("z", "up")), name, unit, meaning, bound)
+
+
+ATTITUDE_TRACKING = (
+    Q("wrapped(mu - mu_d)", "rad", "bank off its reference", bound=math.radians(3.0)),
+    Q("alpha - alpha_d", "rad", "angle of attack off its reference", bound=math.radians(3.0)),
+    Q("beta - beta_d", "rad", "sideslip off its reference", bound=math.radians(3.0)),
+)
+"""What a law of attitude shall make small."""
+
+ALTITUDE_MOTION = (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate"))
+"""What a leader tells of its altitude."""
+PLANE_MOTION = (Q("x", "m", "forward position"), Q("x_dot", "m/s", "forward speed"), *ALTITUDE_MOTION)
+"""What a leader tells of its place in the vertical plane."""
+ACCELERATED_MOTION = (
+    Q("V", "m/s", "airspeed"),
+    Q("V_dot", "m/s^2", "acceleration; a follower's is modelled"),
+    *ALTITUDE_MOTION,
+)
+"""What neighbours tell of their speed and altitude."""
+LONGITUDINAL_DISTURBANCES = (
+    Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
+    Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
+    Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
+)
+"""What disturbance observers of speed, flight path and pitch rate find."""
+THRUST_WANTED = Q("thrust_wanted", "N", "thrust command before saturation")
+ELEVATOR_WANTED = Q("elevator_wanted", "rad", "elevator command before saturation")
