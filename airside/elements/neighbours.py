@@ -10,6 +10,19 @@ from ftcc.link.rotation import nearest_turn
 __all__ = ["disagreement", "error_sums", "extrapolated", "filtered_error_sums", "motion_sums", "weighted_average"]
 
 
+_VALUE, _RATE = range(2)
+"""Columns of a record that begins with a value and its rate."""
+_ERROR, _ERROR_RATE = 0, 3
+"""Columns of a record of errors, each the first of three axes."""
+_HEARD, _FILTERED, _FILTERED_RATE = 0, 1, 4
+"""Columns of the memory of `filtered_error_sums`, the latter two the first of three axes each."""
+
+
+@compiled
+def _axes(row, first):
+    return row[first], row[first + 1], row[first + 2]
+
+
 @compiled
 def extrapolated(value, rate, age, horizon):
     """A neighbour's value carried to the present by the rate it sent, for at most ``horizon`` seconds."""
@@ -30,8 +43,8 @@ def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):
     for j in range(heard.weight.shape[0]):
         weight = heard.weight[j]
         if heard.valid[j] > 0.0:
-            rate = heard.values[j, 1]
-            neighbour = extrapolated(heard.values[j, 0], rate, heard.age[j] + ahead, horizon)
+            rate = heard.values[j, _RATE]
+            neighbour = extrapolated(heard.values[j, _VALUE], rate, heard.age[j] + ahead, horizon)
         elif leave_out > 0.0:
             continue
         else:
@@ -107,10 +120,10 @@ def error_sums(error, heard, oldest):
     rates = (0.0, 0.0, 0.0)
     for j in range(heard.weight.shape[0]):
         if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
-            weight, values = heard.weight[j], heard.values[j]
+            weight, record = heard.weight[j], heard.values[j]
             weights += weight
-            total = added(total, scaled(weight, turned(error, (values[0], values[1], values[2]))))
-            rates = added(rates, scaled(weight, (values[3], values[4], values[5])))
+            total = added(total, scaled(weight, turned(error, _axes(record, _ERROR))))
+            rates = added(rates, scaled(weight, _axes(record, _ERROR_RATE)))
     return weights, total, rates
 
 
@@ -128,15 +141,16 @@ def filtered_error_sums(error, heard, memory, w, oldest, h):
         if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
             row = memory[j]
             for axis in range(3):
-                target = heard.values[j, axis]
-                if row[0] == 0.0:
-                    row[1 + axis], row[4 + axis] = target, 0.0
+                target = heard.values[j, _ERROR + axis]
+                value, rate = row[_FILTERED + axis], row[_FILTERED_RATE + axis]
+                if row[_HEARD] == 0.0:
+                    value, rate = target, 0.0
                 else:
-                    target = nearest_turn(target, row[1 + axis])
-                    row[1 + axis], row[4 + axis] = critically_damped_step(row[1 + axis], row[4 + axis], target, w, h)
-            row[0] = 1.0
+                    value, rate = critically_damped_step(value, rate, nearest_turn(target, value), w, h)
+                row[_FILTERED + axis], row[_FILTERED_RATE + axis] = value, rate
+            row[_HEARD] = 1.0
             weight = heard.weight[j]
             weights += weight
-            total = added(total, scaled(weight, turned(error, (row[1], row[2], row[3]))))
-            rates = added(rates, scaled(weight, (row[4], row[5], row[6])))
+            total = added(total, scaled(weight, turned(error, _axes(row, _FILTERED))))
+            rates = added(rates, scaled(weight, _axes(row, _FILTERED_RATE)))
     return weights, total, rates

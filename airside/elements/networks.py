@@ -7,9 +7,24 @@ from __future__ import annotations
 
 import math
 
+from ftcc.airside.elements.nonlinear import limited
 from ftcc.link.compiled import compiled
 
-__all__ = ["adapt_neuron", "adaptation_rate", "adaptation_step", "diagonal_energy", "grid_axis_energy", "learned_gain"]
+__all__ = [
+    "adapt_neuron",
+    "adaptation_rate",
+    "adaptation_step",
+    "diagonal_energy",
+    "grid_axis_energy",
+    "learned_gain",
+    "network_inputs",
+]
+
+
+@compiled
+def network_inputs(a, scale, largest):
+    """Three inputs of a network: a / scale axis by axis, within +-``largest`` > 0."""
+    return limited(a[0] / scale[0], largest), limited(a[1] / scale[1], largest), limited(a[2] / scale[2], largest)
 
 
 @compiled

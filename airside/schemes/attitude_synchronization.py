@@ -44,7 +44,13 @@ from ftcc.airside.attitude_model import (
 from ftcc.airside.conditions import bounds_errors, stable_in_steps
 from ftcc.airside.elements.filters import butterworth_step, robust_exact_differentiator_on_ramp
 from ftcc.airside.elements.neighbours import error_sums, filtered_error_sums
-from ftcc.airside.elements.networks import adaptation_rate, diagonal_energy, grid_axis_energy, learned_gain
+from ftcc.airside.elements.networks import (
+    adaptation_rate,
+    diagonal_energy,
+    grid_axis_energy,
+    learned_gain,
+    network_inputs,
+)
 from ftcc.airside.elements.nonlinear import clip, smooth_powers, smooth_signs
 from ftcc.airside.elements.observers import discrete_disturbance_observer_steps
 from ftcc.airside.elements.performance import bounded_transforms, performance_tube
@@ -253,10 +259,12 @@ _ZERO = (0.0, 0.0, 0.0)
 
 # The networks, all chosen: what counts as 1 in an input, how far an input counts, and where the neurons are.
 _ANGLE_SCALE = (0.3, 0.2, 0.1)
-"""rad; body rates count in rad/s."""
+"""rad."""
+_RATE_SCALE = (1.0, 1.0, 1.0)
+"""rad/s."""
 _COMMAND_SCALE = (0.6, 0.6, 0.6)
 """rad."""
-_LEAST_INPUT, _LARGEST_INPUT = (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5)
+_LARGEST_INPUT = 1.5
 _ANGLE_NODES, _ANGLE_WIDTH = 3, 2.0
 """First network: nodes per axis of its grid, and their width."""
 _RATE_NODES, _RATE_WIDTH = 61, 6.0
@@ -387,21 +395,16 @@ def _feed_forward(state, e, x2, reference_rate, nominal, gains, dt):
 
 
 @compiled
-def _network_inputs(a, scale):
-    return limited_to(over(a, scale), _LEAST_INPUT, _LARGEST_INPUT)
-
-
-@compiled
 def _network_energies(own, u_f):
     """phi'phi of the two networks, each with a constant neuron."""
-    mu, alpha, beta = _network_inputs(attitude_of(own), _ANGLE_SCALE)
+    mu, alpha, beta = network_inputs(attitude_of(own), _ANGLE_SCALE, _LARGEST_INPUT)
     energy = (
         grid_axis_energy(mu, _ANGLE_NODES, _ANGLE_WIDTH)
         * grid_axis_energy(alpha, _ANGLE_NODES, _ANGLE_WIDTH)
         * grid_axis_energy(beta, _ANGLE_NODES, _ANGLE_WIDTH)
     )
-    rates = limited_to(body_rates_of(own), _LEAST_INPUT, _LARGEST_INPUT)
-    inputs = (mu, alpha, beta, *rates, *_network_inputs(u_f, _COMMAND_SCALE))
+    rates = network_inputs(body_rates_of(own), _RATE_SCALE, _LARGEST_INPUT)
+    inputs = (mu, alpha, beta, *rates, *network_inputs(u_f, _COMMAND_SCALE, _LARGEST_INPUT))
     return 1.0 + energy, 1.0 + diagonal_energy(inputs, _RATE_NODES, _RATE_WIDTH)
 
 
@@ -410,15 +413,11 @@ def _rate_command(state, error, reference_rate, F1, nominal, energy, gains):
     """Virtual rate command X2_bar (7.23)."""
     S1 = subtracted(error.xi, state.z1)
     damping = learned_gain(state.theta1, energy, gains.h11) + 1.0 / (2.0 * gains.h12 * gains.h12)
-    eta = error.eta
-    added_gain = (
-        _capped(eta[0] * eta[0] * damping, gains.cap1),
-        _capped(eta[1] * eta[1] * damping, gains.cap1),
-        _capped(eta[2] * eta[2] * damping, gains.cap1),
-    )
+    mu, alpha, beta = scaled(damping, times(error.eta, error.eta))
+    added_gain = (_capped(mu, gains.cap1), _capped(alpha, gains.cap1), _capped(beta, gains.cap1))
     pull = added(times(_k11(gains), error.xi), times(added_gain, S1))
     pull = added(pull, times(_k12(gains), smooth_powers(S1, gains.upsilon, gains.phi_s)))
-    wanted = subtracted(reference_rate, over(pull, eta))
+    wanted = subtracted(reference_rate, over(pull, error.eta))
     wanted = added(wanted, scaled(gains.lambda2 / error.phi, error.neighbours))
     wanted = subtracted(added(wanted, scaled(error.eps_rate / (error.eps * error.phi), error.E)), F1)
     return applied(nominal.G1_inverse, wanted)
@@ -447,7 +446,7 @@ def _wanted_deflections(state, x2, x2_d, w, d, nominal, energy, gains):
 
 
 @compiled
-def _adapted(state, error, S2, er, nominal, energies, gains, dt):
+def _adapted(state, error, S2, er, nominal, energy1, energy2, gains, dt):
     """z1, z2 (7.25), (7.38) and Theta_1, Theta_2 (7.34), (7.45) a tick later, in Euler steps; the rest is held."""
     z1, z2, theta1, theta2 = state.z1, state.z2, state.theta1, state.theta2
     phi, eta, G1 = error.phi, error.eta, nominal.G1
@@ -461,8 +460,8 @@ def _adapted(state, error, S2, er, nominal, energies, gains, dt):
         z2_rate = subtracted(scaled(phi * gains.k_zeta, applied_transposed(G1, weighted)), times(_k21(gains), z2))
         z2_rate = subtracted(z2_rate, scaled(gains.tau2, smooth_signs(z2, gains.phi_s)))
         attitude_norm = math.sqrt(dot(weighted, weighted))
-        theta1 += h * adaptation_rate(theta1, attitude_norm, energies[0], gains.h11, gains.k13, gains.k14)
-        theta2 += h * adaptation_rate(theta2, rate_error, energies[1], gains.h21, gains.k23, gains.k24)
+        theta1 += h * adaptation_rate(theta1, attitude_norm, energy1, gains.h11, gains.k13, gains.k14)
+        theta2 += h * adaptation_rate(theta2, rate_error, energy2, gains.h21, gains.k23, gains.k24)
         z1, z2 = added(z1, scaled(h, z1_rate)), added(z2, scaled(h, z2_rate))
     return z1, z2, theta1, theta2
 
@@ -505,12 +504,12 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         x2_bar, x2_d, wanted = _traditional(state, own, error, reference_rate, nominal, gains, dt)
         w, z1, z2, theta1, theta2 = state.w, state.z1, state.z2, state.theta1, state.theta2
     else:
-        energies = _network_energies(own, state.u_f)
-        x2_bar = _rate_command(state, error, reference_rate, F1, nominal, energies[0], gains)
+        energy1, energy2 = _network_energies(own, state.u_f)
+        x2_bar = _rate_command(state, error, reference_rate, F1, nominal, energy1, gains)
         x2_d, w = _differentiated(state, x2_bar, gains, dt)
-        wanted, S2 = _wanted_deflections(state, x2, x2_d, w, d, nominal, energies[1], gains)
+        wanted, S2 = _wanted_deflections(state, x2, x2_d, w, d, nominal, energy2, gains)
         er = subtracted(x2_d, x2_bar)
-        z1, z2, theta1, theta2 = _adapted(state, error, S2, er, nominal, energies, gains, dt)
+        z1, z2, theta1, theta2 = _adapted(state, error, S2, er, nominal, energy1, energy2, gains, dt)
 
     # Limits, lead, and the low-passed command (7.35) that the second network sees next.
     low, high = least_deflections(model), largest_deflections(model)

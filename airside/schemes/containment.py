@@ -30,6 +30,7 @@ from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, airspeed_model, flight_path_model, pitch_rate_model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference
+from ftcc.airside.vocabulary import ALTITUDE_MOTION, ELEVATOR_WANTED, LONGITUDINAL_DISTURBANCES, THRUST_WANTED
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -130,7 +131,7 @@ class Output(NamedTuple):
 
 SHARED = {
     "follower": (Q("zhat", "m", "estimated altitude reference"), Q("v", "m/s", "rate of the reference")),
-    "leader": (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate"), Q("V", "m/s"), Q("V_dot", "m/s^2")),
+    "leader": (*ALTITUDE_MOTION, Q("V", "m/s"), Q("V_dot", "m/s^2")),
 }
 SIGNALS = (
     Q("zhat", "m", "estimated altitude reference"),
@@ -140,13 +141,11 @@ SIGNALS = (
     Q("gamma_d", "rad", "commanded flight-path angle"),
     Q("theta_d", "rad", "commanded pitch"),
     Q("q_d", "rad/s", "commanded pitch rate"),
-    Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
-    Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
-    Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
+    *LONGITUDINAL_DISTURBANCES,
     Q("zeta1", "rad/s", "auxiliary system of the elevator"),
     Q("zeta2", "m/s", "auxiliary system of the thrust"),
-    Q("elevator_wanted", "rad", "elevator command before saturation"),
-    Q("thrust_wanted", "N", "thrust command before saturation"),
+    ELEVATOR_WANTED,
+    THRUST_WANTED,
 )
 TRACKING = (
     Q("z - z_d", "m", "altitude off its place between the leaders", bound=2.0),
@@ -191,26 +190,15 @@ _LEAST_AIRSPEED = 10.0
 @compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: the published zeros, or an engagement in flight in which all estimates start at 0."""
-    if gains.in_flight == 0.0:
-        z = gains.z_start
-        return State(z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, z, 0.0, 0.0)
-    z = own.z
+    z, theta, q, xi1, xi3 = gains.z_start, 0.0, 0.0, 0.0, 0.0
+    if gains.in_flight > 0.0:
+        z, theta, q = own.z, own.theta, own.q
+        xi1, xi3 = -gains.k22 * own.gamma, -gains.k52 * (own.V - reference.V)
     return State(
-        z,
-        0.0,
-        -gains.k22 * own.gamma,
-        0.0,
-        -gains.k52 * (own.V - reference.V),
-        own.theta,
-        0.0,
-        own.q,
-        0.0,
-        0.0,
-        0.0,
-        z,
-        0.0,
-        0.0,
-    )
+        zhat=z, integral=0.0, xi1=xi1, xi2=0.0, xi3=xi3,
+        theta_d=theta, p1=0.0, q_d=q, p2=0.0, zeta1=0.0, zeta2=0.0,
+        z_r=z, v_r=0.0, a_r=0.0,
+    )  # fmt: skip
 
 
 @compiled
@@ -284,35 +272,28 @@ def _substep(s, own, heard, reference, model, gains, h, ahead):
     xi3_rate = disturbance_observer_rate(gains.k52, S5, s.xi3, f_v + g_v * acting_thrust, reference.V_dot)
 
     after = State(
-        s.zhat + h * zhat_rate,
-        s.integral + h * integral_rate,
-        s.xi1 + h * xi1_rate,
-        s.xi2 + h * xi2_rate,
-        s.xi3 + h * xi3_rate,
-        s.theta_d + h * theta_d_rate,
-        s.p1 + h * p1_rate,
-        s.q_d + h * q_d_rate,
-        s.p2 + h * p2_rate,
-        s.zeta1 + h * linear_auxiliary_rate(s.zeta1, 0.5 * gains.k41, g_q, elevator, elevator_wanted),
-        s.zeta2 + h * linear_auxiliary_rate(s.zeta2, 0.5 * gains.k51, g_v, thrust, thrust_wanted),
-        s.z_r + h * z_r_rate,
-        s.v_r + h * v_r_rate,
-        s.a_r + h * a_r_rate,
+        zhat=s.zhat + h * zhat_rate,
+        integral=s.integral + h * integral_rate,
+        xi1=s.xi1 + h * xi1_rate,
+        xi2=s.xi2 + h * xi2_rate,
+        xi3=s.xi3 + h * xi3_rate,
+        theta_d=s.theta_d + h * theta_d_rate,
+        p1=s.p1 + h * p1_rate,
+        q_d=s.q_d + h * q_d_rate,
+        p2=s.p2 + h * p2_rate,
+        zeta1=s.zeta1 + h * linear_auxiliary_rate(s.zeta1, 0.5 * gains.k41, g_q, elevator, elevator_wanted),
+        zeta2=s.zeta2 + h * linear_auxiliary_rate(s.zeta2, 0.5 * gains.k51, g_v, thrust, thrust_wanted),
+        z_r=s.z_r + h * z_r_rate,
+        v_r=s.v_r + h * v_r_rate,
+        a_r=s.a_r + h * a_r_rate,
     )
-    shown = Output(
-        thrust,
-        elevator,
-        zhat_rate,
-        S1,
-        S5,
-        gamma_d,
-        d1_hat,
-        d2_hat,
-        lumped_hat,
-        elevator_wanted,
-        thrust_wanted,
-    )
-    return after, shown
+    output = Output(
+        thrust=thrust, elevator=elevator,
+        zhat_rate=zhat_rate, S1=S1, S5=S5, gamma_d=gamma_d,
+        d1_hat=d1_hat, d2_hat=d2_hat, lumped_hat=lumped_hat,
+        elevator_wanted=elevator_wanted, thrust_wanted=thrust_wanted,
+    )  # fmt: skip
+    return after, output
 
 
 @compiled

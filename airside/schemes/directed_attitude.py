@@ -39,7 +39,7 @@ from ftcc.airside.attitude_model import (
 from ftcc.airside.conditions import bounds_errors, stable_in_steps
 from ftcc.airside.elements.filters import implicit_butterworth_step
 from ftcc.airside.elements.neighbours import error_sums
-from ftcc.airside.elements.networks import adapt_neuron
+from ftcc.airside.elements.networks import adapt_neuron, network_inputs
 from ftcc.airside.elements.nonlinear import clip
 from ftcc.airside.elements.performance import bounded_transforms, performance_tube
 from ftcc.airside.elements.saturation import vector_auxiliary_step
@@ -211,8 +211,9 @@ _TRIM = 4.0 * _DEGREES
 _ANGLE_SCALE = (20.0 * _DEGREES, 4.0 * _DEGREES, 4.0 * _DEGREES)
 _RATE_SCALE = (30.0 * _DEGREES, 20.0 * _DEGREES, 20.0 * _DEGREES)
 """Per second."""
-_COMMAND_TRIM, _COMMAND_SCALE = -15.0 * _DEGREES, 30.0 * _DEGREES
-"""Elevator that counts as 0, and what counts as 1 of all three surfaces."""
+_COMMAND_TRIM = -15.0 * _DEGREES
+"""Elevator that counts as 0."""
+_COMMAND_SCALE = (30.0 * _DEGREES, 30.0 * _DEGREES, 30.0 * _DEGREES)
 _LARGEST_INPUT = 3.0
 """Of the second network."""
 _SPREAD = 8.0 * 1.2 * 1.2
@@ -247,24 +248,14 @@ def _adapt_first(W, own, error, gains, dt):
 
 
 @compiled
-def _input(offset, scale):
-    return clip(offset / scale, -_LARGEST_INPUT, _LARGEST_INPUT)
-
-
-@compiled
 def _adapt_second(W, own, u_f, error, gains, dt):
     """Output of the second network (before r2); its weights a tick later (8.39). 17 centres: 0 and +-1 on each axis."""
     aileron, elevator, rudder = u_f
-    inputs = (
-        _input(own.alpha - _TRIM, _ANGLE_SCALE[1]),
-        _input(own.beta, _ANGLE_SCALE[2]),
-        _input(own.p, _RATE_SCALE[0]),
-        _input(own.q, _RATE_SCALE[1]),
-        _input(own.r, _RATE_SCALE[2]),
-        _input(aileron, _COMMAND_SCALE),
-        _input(elevator - _COMMAND_TRIM, _COMMAND_SCALE),
-        _input(rudder, _COMMAND_SCALE),
-    )
+    angles = (own.mu, own.alpha - _TRIM, own.beta)
+    command = (aileron, elevator - _COMMAND_TRIM, rudder)
+    _, alpha, beta = network_inputs(angles, _ANGLE_SCALE, _LARGEST_INPUT)
+    rates = network_inputs(body_rates_of(own), _RATE_SCALE, _LARGEST_INPUT)
+    inputs = (alpha, beta, *rates, *network_inputs(command, _COMMAND_SCALE, _LARGEST_INPUT))
     square = 0.0
     for z in inputs:
         square += z * z

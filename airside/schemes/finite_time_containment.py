@@ -33,6 +33,7 @@ from ftcc.airside.elements.saturation import squared_auxiliary_step
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
+from ftcc.airside.vocabulary import ELEVATOR_WANTED, PLANE_MOTION, THRUST_WANTED
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -187,27 +188,22 @@ class Output(NamedTuple):
     P4: float
 
 
-_S = tuple(quantities(State).values())
-SHARED = {
-    "follower": _S[:4],
-    "leader": (
-        Q("x", "m", "forward position"),
-        Q("x_dot", "m/s", "forward speed"),
-        Q("z", "m", "altitude"),
-        Q("z_dot", "m/s", "climb rate"),
-    ),
-}
+_S = quantities(State)
+_ESTIMATES = tuple(_S[name] for name in ("x_hat", "Vx_hat", "z_hat", "Vz_hat"))
+SHARED = {"follower": _ESTIMATES, "leader": PLANE_MOTION}
+_FORWARD, _VERTICAL = 0, 2
+"""Columns of what is shared: position, then speed."""
 SIGNALS = (
-    *_S[:4],
+    *_ESTIMATES,
     Q("S1", "m", "position tracking error"),
     Q("S2", "m/s", "speed error"),
     Q("S3", "m", "altitude tracking error"),
     Q("S4", "rad", "flight-path error"),
     Q("S5", "rad", "angle-of-attack error"),
     Q("S6", "rad/s", "pitch-rate error"),
-    *_S[4:14],
-    Q("thrust_wanted", "N", "thrust command before saturation"),
-    Q("elevator_wanted", "rad", "elevator command before saturation"),
+    *(_S[name] for name in ("c11", "c12", "c21", "c22", "c31", "c32", "c41", "c42", "eta1", "eta2")),
+    THRUST_WANTED,
+    ELEVATOR_WANTED,
 )
 TRACKING = (
     Q("x - x_d", "m", "position off its place between the leaders", bound=5.0),
@@ -231,8 +227,24 @@ SWITCHES = {
 _LEAST_AIRSPEED = 5.0
 """Airspeed guard of (6.53), m/s."""
 
+_AUXILIARY_START = 0.01
+"""Of both auxiliary systems."""
+_LEAST_COSINE = 0.2
+"""Guard of cos(gamma) in (6.31)."""
+
+# The networks, all chosen: nodes, and what counts as 0 and as 1 in an input.
 _NODES = 5
-"""Nodes of each network, equally spaced on its diagonal (chosen)."""
+"""Of each network, equally spaced on its diagonal."""
+_CRUISE, _SPEED_SCALE = 30.0, 5.0
+"""m/s."""
+_CRUISE_THRUST, _THRUST_SCALE = 30.0, 30.0
+"""N."""
+_ANGLE_SCALE = 0.2
+"""rad."""
+_ACCELERATION_SCALE, _TURN_SCALE, _PITCHING_SCALE, _PITCH_ACCELERATION_SCALE = 2.0, 0.5, 2.0, 10.0
+"""Derivatives of the commands of speed m/s^2, flight path rad/s, angle of attack rad/s and pitch rate rad/s^2."""
+_ELEVATOR_SCALE = 0.5
+"""rad; a pitch rate counts in rad/s."""
 
 
 @compiled
@@ -244,13 +256,14 @@ def _adapted(k, c1, energy, zeta1, c2, zeta2):
 @compiled
 def _evaluate(s, own, V, gamma, alpha, q, model, g):
     """Eqs. (6.31)-(6.78) for the states ``s`` as they stand."""
-    speed, path, attack = (V - 30.0) / 5.0, gamma / 0.2, alpha / 0.2
+    speed, path, attack = (V - _CRUISE) / _SPEED_SCALE, gamma / _ANGLE_SCALE, alpha / _ANGLE_SCALE
 
     # Forward (6.31)-(6.46).
     S1 = own.x - s.x_hat
-    x2d = (-g.k11 * S1 + s.Vx_hat) / max(math.cos(gamma), 0.2)
+    x2d = (-g.k11 * S1 + s.Vx_hat) / max(math.cos(gamma), _LEAST_COSINE)
     S2 = V - x2d + g.b1 * signed_power(S1, g.r)
-    P1 = diagonal_energy((speed, (s.u1_f - 30.0) / 30.0, s.d2 / 2.0, path, attack), _NODES, g.width)
+    thrust_input = (s.u1_f - _CRUISE_THRUST) / _THRUST_SCALE
+    P1 = diagonal_energy((speed, thrust_input, s.d2 / _ACCELERATION_SCALE, path, attack), _NODES, g.width)
     thrust_wanted = (
         -_adapted(g.k21, s.c11, P1, g.z11, s.c12, g.z12) * S2
         - g.b2 * signed_power(S2, g.r)
@@ -262,24 +275,30 @@ def _evaluate(s, own, V, gamma, alpha, q, model, g):
     S3 = own.z - s.z_hat
     x4d = (-g.k31 * S3 + s.Vz_hat) / max(V, _LEAST_AIRSPEED)
     S4 = gamma - x4d + g.b3 * signed_power(S3, g.r)
-    P2 = diagonal_energy((speed, path, s.d4 / 0.5, s.alpha_f / 0.2), _NODES, g.width)
+    P2 = diagonal_energy((speed, path, s.d4 / _TURN_SCALE, s.alpha_f / _ANGLE_SCALE), _NODES, g.width)
     x5d = -_adapted(g.k41, s.c21, P2, g.z21, s.c22, g.z22) * S4
 
     # Angle of attack (6.50), (6.63).
     S5 = alpha - x5d + g.b4 * signed_power(S4, g.r)
-    P3 = diagonal_energy((speed, path, attack, s.d5 / 2.0), _NODES, g.width)
+    P3 = diagonal_energy((speed, path, attack, s.d5 / _PITCHING_SCALE), _NODES, g.width)
     x6d = -_adapted(g.k51, s.c31, P3, g.z31, s.c32, g.z32) * S5
 
     # Pitch rate (6.51), (6.70)-(6.78); positive u pitches up.
     S6 = q - x6d + g.b5 * signed_power(S5, g.r)
-    P4 = diagonal_energy((speed, path, attack, q, s.d6 / 10.0, s.u2_f / 0.5), _NODES, g.width)
+    turning, elevator_input = s.d6 / _PITCH_ACCELERATION_SCALE, s.u2_f / _ELEVATOR_SCALE
+    P4 = diagonal_energy((speed, path, attack, q, turning, elevator_input), _NODES, g.width)
     u_wanted = (
         -_adapted(g.k61, s.c41, P4, g.z41, s.c42, g.z42) * S6
         - g.b6 * signed_power(S6, g.r)
         + g.auxiliary * g.k62 * s.eta2
     )
     u = clip(u_wanted, -model.elevator_max, -model.elevator_min)
-    return Output(thrust, -u, thrust_wanted, -u_wanted, S1, S2, S3, S4, S5, S6, x2d, x4d, x5d, x6d, P1, P2, P3, P4)
+    return Output(
+        thrust=thrust, elevator=-u, thrust_wanted=thrust_wanted, elevator_wanted=-u_wanted,
+        S1=S1, S2=S2, S3=S3, S4=S4, S5=S5, S6=S6,
+        x2d=x2d, x4d=x4d, x5d=x5d, x6d=x6d,
+        P1=P1, P2=P2, P3=P3, P4=P4,
+    )  # fmt: skip
 
 
 @compiled
@@ -299,7 +318,7 @@ def _estimated(place, speed, neighbours, ahead, g):
 
 
 @compiled
-def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elevator, g, h):
+def _advance(s, law, own, forward, vertical, ahead, learns_thrust, learns_elevator, g, h):
     """One internal step of length ``h``, ``ahead`` seconds after the tick, with the evaluation ``law`` held."""
     x_rate, Vx_rate = _estimated(s.x_hat, s.Vx_hat, forward, ahead, g)
     z_rate, Vz_rate = _estimated(s.z_hat, s.Vz_hat, vertical, ahead, g)
@@ -307,45 +326,45 @@ def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elev
     if g.guards > 0.0:
         cap1, cap2, cap4 = g.cap1, g.cap2, g.cap4
     u1_f_rate, u1_f_acceleration = butterworth(s.u1_f, s.u1_f_rate, law.thrust, g.low_pass)
-    alpha_f_rate, alpha_f_acceleration = butterworth(s.alpha_f, s.alpha_f_rate, alpha, g.low_pass)
+    alpha_f_rate, alpha_f_acceleration = butterworth(s.alpha_f, s.alpha_f_rate, own.alpha, g.low_pass)
     u2_f_rate, u2_f_acceleration = butterworth(s.u2_f, s.u2_f_rate, -law.elevator, g.low_pass)
     p2_rate, d2_rate = sliding_mode_differentiator(s.p2, s.d2, law.x2d, g.mu1, g.mu2)
     p4_rate, d4_rate = sliding_mode_differentiator(s.p4, s.d4, law.x4d, g.mu1, g.mu2)
     p5_rate, d5_rate = sliding_mode_differentiator(s.p5, s.d5, law.x5d, g.mu1, g.mu2)
     p6_rate, d6_rate = sliding_mode_differentiator(s.p6, s.d6, law.x6d, g.mu1, g.mu2)
     return State(
-        s.x_hat + h * x_rate,
-        s.Vx_hat + h * Vx_rate,
-        s.z_hat + h * z_rate,
-        s.Vz_hat + h * Vz_rate,
-        _learned(s.c11, law.S2, law.P1, g.z11, g.g11, g.h11, learns_thrust, cap1, h),
-        _learned(s.c12, law.S2, 1.0, g.z12, g.g12, g.h12, learns_thrust, cap1, h),
-        _learned(s.c21, law.S4, law.P2, g.z21, g.g21, g.h21, learns_elevator, cap2, h),
-        _learned(s.c22, law.S4, 1.0, g.z22, g.g22, g.h22, learns_elevator, cap2, h),
-        _learned(s.c31, law.S5, law.P3, g.z31, g.g31, g.h31, learns_elevator, cap2, h),
-        _learned(s.c32, law.S5, 1.0, g.z32, g.g32, g.h32, learns_elevator, cap2, h),
-        _learned(s.c41, law.S6, law.P4, g.z41, g.g41, g.h41, learns_elevator, cap4, h),
-        _learned(s.c42, law.S6, 1.0, g.z42, g.g42, g.h42, learns_elevator, cap4, h),
-        squared_auxiliary_step(s.eta1, g.k22, law.S2, law.thrust - law.thrust_wanted, g.nu1, h),
-        squared_auxiliary_step(s.eta2, g.k62, law.S6, law.elevator_wanted - law.elevator, g.nu2, h),
-        s.u1_f + h * u1_f_rate,
-        s.u1_f_rate + h * u1_f_acceleration,
-        s.alpha_f + h * alpha_f_rate,
-        s.alpha_f_rate + h * alpha_f_acceleration,
-        s.u2_f + h * u2_f_rate,
-        s.u2_f_rate + h * u2_f_acceleration,
-        s.p2 + h * p2_rate,
-        s.d2 + h * d2_rate,
-        s.p4 + h * p4_rate,
-        s.d4 + h * d4_rate,
-        s.p5 + h * p5_rate,
-        s.d5 + h * d5_rate,
-        s.p6 + h * p6_rate,
-        s.d6 + h * d6_rate,
-        s.V_before,
-        s.gamma_before,
-        s.alpha_before,
-        s.q_before,
+        x_hat=s.x_hat + h * x_rate,
+        Vx_hat=s.Vx_hat + h * Vx_rate,
+        z_hat=s.z_hat + h * z_rate,
+        Vz_hat=s.Vz_hat + h * Vz_rate,
+        c11=_learned(s.c11, law.S2, law.P1, g.z11, g.g11, g.h11, learns_thrust, cap1, h),
+        c12=_learned(s.c12, law.S2, 1.0, g.z12, g.g12, g.h12, learns_thrust, cap1, h),
+        c21=_learned(s.c21, law.S4, law.P2, g.z21, g.g21, g.h21, learns_elevator, cap2, h),
+        c22=_learned(s.c22, law.S4, 1.0, g.z22, g.g22, g.h22, learns_elevator, cap2, h),
+        c31=_learned(s.c31, law.S5, law.P3, g.z31, g.g31, g.h31, learns_elevator, cap2, h),
+        c32=_learned(s.c32, law.S5, 1.0, g.z32, g.g32, g.h32, learns_elevator, cap2, h),
+        c41=_learned(s.c41, law.S6, law.P4, g.z41, g.g41, g.h41, learns_elevator, cap4, h),
+        c42=_learned(s.c42, law.S6, 1.0, g.z42, g.g42, g.h42, learns_elevator, cap4, h),
+        eta1=squared_auxiliary_step(s.eta1, g.k22, law.S2, law.thrust - law.thrust_wanted, g.nu1, h),
+        eta2=squared_auxiliary_step(s.eta2, g.k62, law.S6, law.elevator_wanted - law.elevator, g.nu2, h),
+        u1_f=s.u1_f + h * u1_f_rate,
+        u1_f_rate=s.u1_f_rate + h * u1_f_acceleration,
+        alpha_f=s.alpha_f + h * alpha_f_rate,
+        alpha_f_rate=s.alpha_f_rate + h * alpha_f_acceleration,
+        u2_f=s.u2_f + h * u2_f_rate,
+        u2_f_rate=s.u2_f_rate + h * u2_f_acceleration,
+        p2=s.p2 + h * p2_rate,
+        d2=s.d2 + h * d2_rate,
+        p4=s.p4 + h * p4_rate,
+        d4=s.d4 + h * d4_rate,
+        p5=s.p5 + h * p5_rate,
+        d5=s.d5 + h * d5_rate,
+        p6=s.p6 + h * p6_rate,
+        d6=s.d6 + h * d6_rate,
+        V_before=own.V,
+        gamma_before=own.gamma,
+        alpha_before=own.alpha,
+        q_before=own.q,
     )
 
 
@@ -353,13 +372,14 @@ def _advance(s, law, alpha, forward, vertical, ahead, learns_thrust, learns_elev
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State at the first tick: estimates at the own motion, filters at the present command and attitude."""
     V_x = own.V * math.cos(own.gamma)
-    estimates = (own.x, V_x, own.z, own.V * math.sin(own.gamma))
-    adapted = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    auxiliary = (0.01, 0.01)
-    low_passes = (own.thrust, 0.0, own.alpha, 0.0, -own.elevator, 0.0)
-    differentiators = (V_x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    before = (own.V, own.gamma, own.alpha, own.q)
-    return State(*estimates, *adapted, *auxiliary, *low_passes, *differentiators, *before)
+    return State(
+        x_hat=own.x, Vx_hat=V_x, z_hat=own.z, Vz_hat=own.V * math.sin(own.gamma),
+        c11=0.0, c12=0.0, c21=0.0, c22=0.0, c31=0.0, c32=0.0, c41=0.0, c42=0.0,
+        eta1=_AUXILIARY_START, eta2=_AUXILIARY_START,
+        u1_f=own.thrust, u1_f_rate=0.0, alpha_f=own.alpha, alpha_f_rate=0.0, u2_f=-own.elevator, u2_f_rate=0.0,
+        p2=V_x, d2=0.0, p4=0.0, d4=0.0, p5=0.0, d5=0.0, p6=0.0, d6=0.0,
+        V_before=own.V, gamma_before=own.gamma, alpha_before=own.alpha, q_before=own.q,
+    )  # fmt: skip
 
 
 @compiled
@@ -372,18 +392,18 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
         alpha += alpha - state.alpha_before
         q += q - state.q_before
     law = _evaluate(state, own, V, gamma, alpha, q, model, gains)
-    forward = motion_sums(heard, 0, gains.extrapolation)
-    vertical = motion_sums(heard, 2, gains.extrapolation)
+    forward = motion_sums(heard, _FORWARD, gains.extrapolation)
+    vertical = motion_sums(heard, _VERTICAL, gains.extrapolation)
     learns_thrust = gains.adapt_thrust > 0.0
     learns_elevator = gains.adapt_elevator > 0.0 and not 0.0 < gains.adapt_until <= own.t
     if gains.guards > 0.0:
         learns_thrust = learns_thrust and law.thrust == law.thrust_wanted
         learns_elevator = learns_elevator and law.elevator == law.elevator_wanted
     h = dt / gains.substeps
-    after = State(*state[:28], own.V, own.gamma, own.alpha, own.q)
+    after = state
     for n in range(int(gains.substeps)):
         ahead = gains.growth * n * h
-        after = _advance(after, law, own.alpha, forward, vertical, ahead, learns_thrust, learns_elevator, gains, h)
+        after = _advance(after, law, own, forward, vertical, ahead, learns_thrust, learns_elevator, gains, h)
     return after, law
 
 
@@ -396,8 +416,13 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
-    errors = (output.S1, output.S2, output.S3, output.S4, output.S5, output.S6)
-    return (*state[:4], *errors, *state[4:14], output.thrust_wanted, output.elevator_wanted)
+    s = state
+    return (
+        s.x_hat, s.Vx_hat, s.z_hat, s.Vz_hat,
+        output.S1, output.S2, output.S3, output.S4, output.S5, output.S6,
+        s.c11, s.c12, s.c21, s.c22, s.c31, s.c32, s.c41, s.c42, s.eta1, s.eta2,
+        output.thrust_wanted, output.elevator_wanted,
+    )  # fmt: skip
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:

@@ -42,11 +42,13 @@ from ftcc.airside.elements.fractional import (
 )
 from ftcc.airside.elements.nonlinear import clip, limited, rounded_power
 from ftcc.airside.elements.observers import reference_system_step
+from ftcc.airside.elements.vectors import added, scaled, subtracted
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.point_mass import acceleration, commands_for, velocity
 from ftcc.airside.references.position import Fire, Reference
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity
+from ftcc.airside.vocabulary import space
 from ftcc.link.compiled import Room, Vector, compiled
 from ftcc.link.graph import Assumption
 
@@ -135,36 +137,24 @@ class Output(NamedTuple):
     d_hat: Vector
 
 
-_ERROR = (
-    Q("Pt_x", "m", "position error, north"),
-    Q("Pt_y", "m", "position error, east"),
-    Q("Pt_z", "m", "position error, up"),
-)
+_POSITION_ERROR = space("Pt_{}", "m", "position error, {}")
 SHARED = {
     "follower": (
-        *_ERROR,
-        Q("Vt_x", "m/s", "its rate"),
-        Q("Vt_y", "m/s"),
-        Q("Vt_z", "m/s"),
-        Q("At_x", "m/s^2", "commanded error acceleration, for the monograph form"),
-        Q("At_y", "m/s^2"),
-        Q("At_z", "m/s^2"),
+        *_POSITION_ERROR,
+        *space("Vt_{}", "m/s", "its rate, {}"),
+        *space("At_{}", "m/s^2", "commanded error acceleration, {}, for the monograph form"),
     )
 }
+_ERROR, _ERROR_RATE, _ERROR_ACCELERATION = 0, 3, 6
+"""Columns of what is shared, each the first of three axes."""
 SIGNALS = (
     Q("x_ref", "m", "reference, north"),
     Q("y_ref", "m", "reference, east"),
     Q("z_ref", "m", "reference, altitude"),
-    *_ERROR,
-    Q("e_x", "m", "cooperative error, north"),
-    Q("e_y", "m", "cooperative error, east"),
-    Q("e_z", "m", "cooperative error, up"),
-    Q("S_x", "m/s", "sliding variable, north"),
-    Q("S_y", "m/s", "sliding variable, east"),
-    Q("S_z", "m/s", "sliding variable, up"),
-    Q("Dhat_x", "m/s^2", "estimated lumped disturbance, north"),
-    Q("Dhat_y", "m/s^2", "estimated lumped disturbance, east"),
-    Q("Dhat_z", "m/s^2", "estimated lumped disturbance, up"),
+    *_POSITION_ERROR,
+    *space("e_{}", "m", "cooperative error, {}"),
+    *space("S_{}", "m/s", "sliding variable, {}"),
+    *space("Dhat_{}", "m/s^2", "estimated lumped disturbance, {}"),
     Q("V_ref", "m/s", "speed of the reference"),
     Q("fire_north", "m", "centre of the formation, north"),
     Q("fire_east", "m", "centre of the formation, east"),
@@ -205,30 +195,53 @@ SWITCHES = {
 }
 
 
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@compiled
+def _commands(own):
+    """Thrust (N), load factor and bank (rad) in force; the latter two come in the places of elevator and aileron."""
+    return own.thrust, own.elevator, own.aileron
+
+
+@compiled
+def _path(own):
+    """Speed (m/s), flight-path angle and course (rad)."""
+    return own.V, own.gamma, own.chi
+
+
 @compiled
 def _errors(own, reference):
     """Position and velocity error at the stamp of the measurement."""
-    vx, vy, vz = velocity(own.V, own.gamma, own.chi)
-    return (
-        (own.x - reference.x, own.y - reference.y, own.z - reference.z),
-        (vx - reference.x_dot, vy - reference.y_dot, vz - reference.z_dot),
-    )
+    place, planned = (own.x, own.y, own.z), (reference.x, reference.y, reference.z)
+    planned_velocity = (reference.x_dot, reference.y_dot, reference.z_dot)
+    return subtracted(place, planned), subtracted(velocity(*_path(own)), planned_velocity)
 
 
 @compiled
-def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> tuple[Vector | float, ...]:
-    """State at the first tick; the poles' memory, its last field, begins empty."""
-    nothing = (0.0, 0.0, 0.0)
-    force = (own.thrust, own.elevator, own.aileron)
-    path = (own.V, own.gamma, own.chi)
-    return velocity(*path), nothing, nothing, nothing, nothing, nothing, nothing, force, force, path, 0.0
+def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
+    """State at the first tick; the memory of the fractional operator begins empty."""
+    force, path = _commands(own), _path(own)
+    return State(
+        eta=velocity(*path), gap=_ZERO, zeta0=_ZERO, zeta1=_ZERO, d_hat=_ZERO, f=_ZERO, a_own=_ZERO,
+        position=force, force=force, path=path, begun=0.0,
+        poles=0.0,
+    )  # fmt: skip
 
 
 @compiled
-def _observed_axis(s, axis, rate, explained, gains, h):
+def _observed_axis(s, axis, velocity_now, explained, gains, h):
     """Observer (R7) of one axis: d_hat, eta, gap, zeta0, zeta1."""
     estimate, eta, gap, zeta0, zeta1 = reference_system_step(
-        s.eta[axis], s.gap[axis], s.zeta0[axis], s.zeta1[axis], rate, explained, gains.k_eta, gains.bound, h
+        s.eta[axis],
+        s.gap[axis],
+        s.zeta0[axis],
+        s.zeta1[axis],
+        velocity_now[axis],
+        explained[axis],
+        gains.k_eta,
+        gains.bound,
+        h,
     )
     return low_pass_step(s.d_hat[axis], estimate, gains.tau_d, h), eta, gap, zeta0, zeta1
 
@@ -242,24 +255,25 @@ def _observed(s, own, model, gains, h):
     d_hat, eta, gap, zeta0, zeta1, position : Vector
         As in `State`.
     """
-    thrust_in, load_in, bank_in = own.thrust, own.elevator, own.aileron
-    if gains.held > 0.0:
-        thrust_in, load_in, bank_in = s.force
-    thrust, thrust_after = modelled_stroke(s.position[0], thrust_in, gains.lag_thrust, h)
-    load, load_after = modelled_stroke(s.position[1], load_in, gains.lag_load, h)
-    bank, bank_after = modelled_stroke(s.position[2], bank_in, gains.lag_bank, h)
-    before = acceleration(s.path[0], s.path[1], s.path[2], thrust, load, bank, model)
+    thrust_in, load_in, bank_in = s.force if gains.held > 0.0 else _commands(own)
+    thrust_was, load_was, bank_was = s.position
+    thrust, thrust_after = modelled_stroke(thrust_was, thrust_in, gains.lag_thrust, h)
+    load, load_after = modelled_stroke(load_was, load_in, gains.lag_load, h)
+    bank, bank_after = modelled_stroke(bank_was, bank_in, gains.lag_bank, h)
+    V_was, gamma_was, chi_was = s.path
+    before = acceleration(V_was, gamma_was, chi_was, thrust, load, bank, model)
     now = acceleration(own.V, own.gamma, own.chi, thrust, load, bank, model)
-    v = velocity(own.V, own.gamma, own.chi)
-    x = _observed_axis(s, 0, v[0], 0.5 * (before[0] + now[0]), gains, h)
-    y = _observed_axis(s, 1, v[1], 0.5 * (before[1] + now[1]), gains, h)
-    z = _observed_axis(s, 2, v[2], 0.5 * (before[2] + now[2]), gains, h)
+    v = velocity(*_path(own))
+    mean = scaled(0.5, added(before, now))
+    d_x, eta_x, gap_x, zeta0_x, zeta1_x = _observed_axis(s, 0, v, mean, gains, h)
+    d_y, eta_y, gap_y, zeta0_y, zeta1_y = _observed_axis(s, 1, v, mean, gains, h)
+    d_z, eta_z, gap_z, zeta0_z, zeta1_z = _observed_axis(s, 2, v, mean, gains, h)
     return (
-        (x[0], y[0], z[0]),
-        (x[1], y[1], z[1]),
-        (x[2], y[2], z[2]),
-        (x[3], y[3], z[3]),
-        (x[4], y[4], z[4]),
+        (d_x, d_y, d_z),
+        (eta_x, eta_y, eta_z),
+        (gap_x, gap_y, gap_z),
+        (zeta0_x, zeta0_y, zeta0_z),
+        (zeta1_x, zeta1_y, zeta1_z),
         (thrust_after, load_after, bank_after),
     )
 
@@ -295,8 +309,8 @@ def _fed(heard, column, gains):
 @compiled
 def _axis(s, axis, heard, error, rate, gains):
     """Error, sliding variable and commanded error acceleration (R1)-(R5) of one axis; its memory moves on."""
-    e, degree = _cooperative(heard, axis, error, gains)
-    e_rate, _ = _cooperative(heard, 3 + axis, rate, gains)
+    e, degree = _cooperative(heard, _ERROR + axis, error[axis], gains)
+    e_rate, _ = _cooperative(heard, _ERROR_RATE + axis, rate[axis], gains)
     seen = limited(e, gains.e_sat)
     power, slope = rounded_power(seen, gains.r, gains.eps)
     f = gains.kap1 * seen + gains.kap2 * power
@@ -306,7 +320,7 @@ def _axis(s, axis, heard, error, rate, gains):
     S = e_rate + fractional_integral(s.poles, axis, f)
     nu = -fractional_rate(s.poles, axis, f, f_rate) - gains.k1 * S - gains.k2 * clip(S / gains.phi_s, -1.0, 1.0)
     own_weight = gains.lam1 + gains.lam2 * degree
-    return e, S, f, limited((nu + _fed(heard, 6 + axis, gains)) / own_weight, gains.a_max)
+    return e, S, f, limited((nu + _fed(heard, _ERROR_ACCELERATION + axis, gains)) / own_weight, gains.a_max)
 
 
 @compiled
@@ -318,67 +332,45 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     d_hat, eta, gap, zeta0, zeta1, position = s.d_hat, s.eta, s.gap, s.zeta0, s.zeta1, s.position
     if s.begun > 0.0:
         d_hat, eta, gap, zeta0, zeta1, position = _observed(s, own, model, gains, dt)
-    x = _axis(s, 0, heard, error[0], rate[0], gains)
-    y = _axis(s, 1, heard, error[1], rate[1], gains)
-    z = _axis(s, 2, heard, error[2], rate[2], gains)
-    thrust, load_factor, bank = commands_for(
-        reference.x_ddot + x[3] - gains.observer * d_hat[0],
-        reference.y_ddot + y[3] - gains.observer * d_hat[1],
-        reference.z_ddot + z[3] - gains.observer * d_hat[2],
-        own.V,
-        own.gamma,
-        own.chi,
-        gains.bank_max,
-        gains.n_max,
-        model,
-    )
+    e_x, S_x, f_x, a_x = _axis(s, 0, heard, error, rate, gains)
+    e_y, S_y, f_y, a_y = _axis(s, 1, heard, error, rate, gains)
+    e_z, S_z, f_z, a_z = _axis(s, 2, heard, error, rate, gains)
+    a_own = (a_x, a_y, a_z)
+    planned = (reference.x_ddot, reference.y_ddot, reference.z_ddot)
+    x, y, z = subtracted(added(planned, a_own), scaled(gains.observer, d_hat))
+    thrust, load_factor, bank = commands_for(x, y, z, own.V, own.gamma, own.chi, gains.bank_max, gains.n_max, model)
     after = State(
-        eta,
-        gap,
-        zeta0,
-        zeta1,
-        d_hat,
-        (x[2], y[2], z[2]),
-        (x[3], y[3], z[3]),
-        position,
-        (own.thrust, own.elevator, own.aileron),
-        (own.V, own.gamma, own.chi),
-        1.0,
-        s.poles,
-    )
-    return after, Output(thrust, load_factor, bank, (x[0], y[0], z[0]), (x[1], y[1], z[1]), d_hat)
+        eta=eta, gap=gap, zeta0=zeta0, zeta1=zeta1, d_hat=d_hat, f=(f_x, f_y, f_z), a_own=a_own,
+        position=position, force=_commands(own), path=_path(own), begun=1.0,
+        poles=s.poles,
+    )  # fmt: skip
+    output = Output(
+        thrust=thrust, load_factor=load_factor, bank=bank,
+        e=(e_x, e_y, e_z), S=(S_x, S_y, S_z), d_hat=d_hat,
+    )  # fmt: skip
+    return after, output
 
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """What the neighbours hear: errors at the stamp of the measurement, the acceleration of the tick before."""
     error, rate = _errors(own, reference)
-    a = state.a_own
-    return error[0], error[1], error[2], rate[0], rate[1], rate[2], a[0], a[1], a[2]
+    return (*error, *rate, *state.a_own)
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of the measurement."""
     error, _ = _errors(own, reference)
-    e, S, d_hat = output.e, output.S, output.d_hat
     x, y, z = reference.x_dot, reference.y_dot, reference.z_dot
     return (
         reference.x,
         reference.y,
         reference.z,
-        error[0],
-        error[1],
-        error[2],
-        e[0],
-        e[1],
-        e[2],
-        S[0],
-        S[1],
-        S[2],
-        d_hat[0],
-        d_hat[1],
-        d_hat[2],
+        *error,
+        *output.e,
+        *output.S,
+        *output.d_hat,
         math.sqrt(x * x + y * y + z * z),
         reference.north,
         reference.east,

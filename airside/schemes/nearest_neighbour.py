@@ -34,6 +34,7 @@ from ftcc.airside.elements.saturation import linear_auxiliary_rate
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model, airspeed_model, flight_path_model, pitch_rate_model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
+from ftcc.airside.vocabulary import ACCELERATED_MOTION, LONGITUDINAL_DISTURBANCES
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -139,13 +140,9 @@ class Output(NamedTuple):
     xi2_rate: float
 
 
-_MOTION = (
-    Q("V", "m/s", "airspeed"),
-    Q("V_dot", "m/s^2", "acceleration; a follower's is modelled"),
-    Q("z", "m", "altitude"),
-    Q("z_dot", "m/s", "climb rate"),
-)
-SHARED = {"follower": _MOTION, "leader": _MOTION}
+SHARED = {"follower": ACCELERATED_MOTION, "leader": ACCELERATED_MOTION}
+_SPEED, _ALTITUDE = 0, 2
+"""Columns of what is shared, each with its rate behind it."""
 _S = quantities(State)
 SIGNALS = (
     Q("V_id", "m/s", "neighbours' mean speed"),
@@ -155,9 +152,7 @@ SIGNALS = (
     Q("S1", "m/s", "speed tracking error"),
     Q("S2", "m", "altitude tracking error"),
     *(_S[name] for name in ("gamma_d", "theta_d", "q_d", "xi1", "xi2")),
-    Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
-    Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
-    Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
+    *LONGITUDINAL_DISTURBANCES,
     Q("thrust_wanted", "N", "thrust before saturation"),
     Q("elevator_wanted", "rad", "elevator before saturation"),
 )
@@ -252,48 +247,35 @@ def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt
     elif gains.rate_filter > 0.0:
         V_rate = s.V_rate_f
     return Output(
-        sent_thrust,
-        sent_elevator,
-        thrust_wanted,
-        elevator_wanted,
-        S1,
-        S2,
-        d1_hat,
-        d2_hat,
-        lumped_hat,
-        V_id,
-        z_id,
-        V_rate,
-        known_V_rate,
-        thrust_position,
-        elevator_position,
-        gamma_bar,
-        theta_bar,
-        gamma_d_rate,
-        theta_d_rate,
-        q_d_rate,
-        disturbance_observer_rate(gains.k11, S1, s.x1, f_v + g_v * acting_thrust, V_d_rate),
-        disturbance_observer_rate(gains.k31, S3, s.x2, f_g + g_g * own.theta, gamma_d_rate),
-        disturbance_observer_rate(gains.k51, S5, s.x3, f_q + g_q * acting_elevator, q_d_rate),
-        linear_auxiliary_rate(s.xi1, 0.5 * gains.k12, g_v, thrust, thrust_wanted),
-        linear_auxiliary_rate(s.xi2, gains.k52, g_q, elevator, elevator_wanted),
-    )
+        thrust=sent_thrust, elevator=sent_elevator, thrust_wanted=thrust_wanted, elevator_wanted=elevator_wanted,
+        S1=S1, S2=S2, d1_hat=d1_hat, d2_hat=d2_hat, lumped_hat=lumped_hat,
+        V_id=V_id, z_id=z_id, V_rate=V_rate, known_V_rate=known_V_rate,
+        thrust_position=thrust_position, elevator_position=elevator_position,
+        gamma_bar=gamma_bar, theta_bar=theta_bar,
+        gamma_d_rate=gamma_d_rate, theta_d_rate=theta_d_rate, q_d_rate=q_d_rate,
+        x1_rate=disturbance_observer_rate(gains.k11, S1, s.x1, f_v + g_v * acting_thrust, V_d_rate),
+        x2_rate=disturbance_observer_rate(gains.k31, S3, s.x2, f_g + g_g * own.theta, gamma_d_rate),
+        x3_rate=disturbance_observer_rate(gains.k51, S5, s.x3, f_q + g_q * acting_elevator, q_d_rate),
+        xi1_rate=linear_auxiliary_rate(s.xi1, 0.5 * gains.k12, g_v, thrust, thrust_wanted),
+        xi2_rate=linear_auxiliary_rate(s.xi2, gains.k52, g_q, elevator, elevator_wanted),
+    )  # fmt: skip
 
 
 @compiled
 def _initial(own, V, V_rate, z, z_rate, gamma_d, theta_d, begun):
-    observers, auxiliary = (0.0, 0.0, 0.0), (0.0, 0.0)
-    reference = (V, z, V, V_rate, z, z_rate)
-    acceleration = (0.0, own.V, 0.0)
     return State(
-        *observers, gamma_d, theta_d, 0.0, *auxiliary, *reference, own.thrust, own.elevator, *acceleration, begun
-    )
+        x1=0.0, x2=0.0, x3=0.0,
+        gamma_d=gamma_d, theta_d=theta_d, q_d=0.0, xi1=0.0, xi2=0.0,
+        V_mean=V, z_mean=z, V_r=V, V_r_rate=V_rate, z_r=z, z_r_rate=z_rate,
+        thrust=own.thrust, elevator=own.elevator,
+        V_rate_f=0.0, V_before=own.V, known_before=0.0, begun=begun,
+    )  # fmt: skip
 
 
 @compiled
 def start(own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains) -> State:
     """State before the first tick; the first step sets the filters."""
-    state: State = _initial(own, own.V, 0.0, own.z, 0.0, 0.0, 0.0, 0.0)
+    state: State = _initial(own, V=own.V, V_rate=0.0, z=own.z, z_rate=0.0, gamma_d=0.0, theta_d=0.0, begun=0.0)
     return state
 
 
@@ -306,8 +288,8 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     """
     s = state
     # Nearest-neighbour reference (4.10), (4.11).
-    V_id, V_id_rate, weights = weighted_average(heard, 0, gains.oldest, gains.horizon)
-    z_id, z_id_rate, _ = weighted_average(heard, 2, gains.oldest, gains.horizon)
+    V_id, V_id_rate, weights = weighted_average(heard, _SPEED, gains.oldest, gains.horizon)
+    z_id, z_id_rate, _ = weighted_average(heard, _ALTITUDE, gains.oldest, gains.horizon)
     if weights == 0.0:
         V_id, z_id = s.V_mean, s.z_mean
     beginning = s.begun == 0.0
@@ -320,7 +302,9 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     # Beginning takes three passes: the pitch command depends on the filtered flight-path command.
     for _ in range(3 if beginning else 1):
         if beginning:
-            s = _initial(own, V_id, V_id_rate, z_id, z_id_rate, gamma_d, theta_d, 1.0)
+            s = _initial(
+                own, V=V_id, V_rate=V_id_rate, z=z_id, z_rate=z_id_rate, gamma_d=gamma_d, theta_d=theta_d, begun=1.0
+            )
         law = _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt)
         gamma_d, theta_d = law.gamma_bar, law.theta_bar
 
@@ -361,10 +345,13 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
     """`SIGNALS` for the instant of ``state``."""
-    reference_tracked = (own.V - output.S1, own.z - output.S2)
-    estimates = (output.d1_hat, output.d2_hat, output.lumped_hat)
-    errors, wanted = (output.S1, output.S2), (output.thrust_wanted, output.elevator_wanted)
-    return (output.V_id, output.z_id, *reference_tracked, *errors, *state[3:8], *estimates, *wanted)
+    V_tracked, z_tracked = own.V - output.S1, own.z - output.S2
+    return (
+        output.V_id, output.z_id, V_tracked, z_tracked, output.S1, output.S2,
+        state.gamma_d, state.theta_d, state.q_d, state.xi1, state.xi2,
+        output.d1_hat, output.d2_hat, output.lumped_hat,
+        output.thrust_wanted, output.elevator_wanted,
+    )  # fmt: skip
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:

@@ -37,6 +37,7 @@ from ftcc.airside.elements.saturation import auxiliary_step
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Problem, Quantity, Reference, quantities
+from ftcc.airside.vocabulary import ALTITUDE_MOTION, ELEVATOR_WANTED
 from ftcc.link.compiled import compiled
 from ftcc.link.graph import Assumption
 
@@ -181,7 +182,7 @@ class Output(NamedTuple):
 
 SHARED = {
     "follower": (Q("zhat", "m", "estimated altitude of the leader"), Q("v", "m/s", "rate of the reference")),
-    "leader": (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate")),
+    "leader": ALTITUDE_MOTION,
 }
 _S = quantities(State)
 SIGNALS = (
@@ -193,7 +194,7 @@ SIGNALS = (
     Q("E2", "-", "transformed altitude error"),
     *(_S[name] for name in ("gamma_d", "theta_d", "q_d", "F_gamma", "F_q", "zeta")),
     Q("unexplained", "rad/s^2", "pitch acceleration that the control does not explain"),
-    Q("elevator_wanted", "rad", "elevator command before saturation"),
+    ELEVATOR_WANTED,
 )
 TRACKING = (Q("z - z_d", "m", "altitude off the leader's", bound=2.0),)
 GRAPH = Assumption.ONE_LEADER_UNDIRECTED
@@ -229,6 +230,16 @@ SWITCHES = {
 
 _LEAST_AIRSPEED = 5.0
 """Airspeed guard in every division, m/s."""
+
+# The networks, all chosen: what counts as 0 and as 1 in an input; nodes per axis and their width.
+_CRUISE, _SPEED_SCALE = 30.0, 3.0
+"""m/s."""
+_ANGLE_SCALE, _RATE_SCALE, _ELEVATOR_SCALE = 0.1, 0.5, 0.87
+"""Flight path and pitch rad, pitch rate rad/s, elevator rad."""
+_PATH_NODES, _PATH_WIDTH = 3, 2.0
+"""Of the flight path's network."""
+_RATE_NODES, _RATE_WIDTH = 2, 3.0
+"""Of the pitch rate's network."""
 
 
 @compiled
@@ -269,10 +280,11 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):
 
     # Step 2: flight path (3.38)-(3.40).
     E3 = gamma - s.gamma_d
+    speed, path = (V - _CRUISE) / _SPEED_SCALE, gamma / _ANGLE_SCALE
     energy_gamma = gains.networks * (
-        grid_axis_energy((V - 30.0) / 3.0, 3, 2.0)
-        * grid_axis_energy(gamma / 0.1, 3, 2.0)
-        * grid_axis_energy(s.theta_f / 0.1, 3, 2.0)
+        grid_axis_energy(speed, _PATH_NODES, _PATH_WIDTH)
+        * grid_axis_energy(path, _PATH_NODES, _PATH_WIDTH)
+        * grid_axis_energy(s.theta_f / _ANGLE_SCALE, _PATH_NODES, _PATH_WIDTH)
     )
     gain = (
         gains.k31
@@ -291,11 +303,11 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):
     # Step 4: pitch rate (3.54)-(3.57); positive u pitches up.
     E5 = own.q - s.q_d
     energy_q = gains.networks * (
-        grid_axis_energy((V - 30.0) / 3.0, 2, 3.0)
-        * grid_axis_energy(gamma / 0.1, 2, 3.0)
-        * grid_axis_energy(own.theta / 0.1, 2, 3.0)
-        * grid_axis_energy(own.q / 0.5, 2, 3.0)
-        * grid_axis_energy(s.u_f / 0.87, 2, 3.0)
+        grid_axis_energy(speed, _RATE_NODES, _RATE_WIDTH)
+        * grid_axis_energy(path, _RATE_NODES, _RATE_WIDTH)
+        * grid_axis_energy(own.theta / _ANGLE_SCALE, _RATE_NODES, _RATE_WIDTH)
+        * grid_axis_energy(own.q / _RATE_SCALE, _RATE_NODES, _RATE_WIDTH)
+        * grid_axis_energy(s.u_f / _ELEVATOR_SCALE, _RATE_NODES, _RATE_WIDTH)
     )
     gain = (
         gains.k51
@@ -310,36 +322,23 @@ def _evaluate(s, own, total, V_rate, reference, model, gains):
         u_wanted, lead_rate = lead_filter(s.u_l, u_before_lead, gains.lead_slow, gains.lead_fast)
     u = clip(u_wanted, -model.elevator_max, -model.elevator_min)
     return Output(
-        thrust,
-        -u,
-        -u_wanted,
-        speed_error,
-        z_d_rate,
-        v_ref,
-        error,
-        width,
-        transformed,
-        gamma_bar,
-        theta_bar,
-        q_bar,
-        E3,
-        E4,
-        E5,
-        energy_gamma,
-        energy_q,
-        unexplained,
-        q_h_rate,
-        u_before_lead,
-        lead_rate,
-    )
+        thrust=thrust, elevator=-u, elevator_wanted=-u_wanted,
+        speed_error=speed_error, z_d_rate=z_d_rate, v_ref=v_ref, error=error, width=width, transformed=transformed,
+        gamma_bar=gamma_bar, theta_bar=theta_bar, q_bar=q_bar, E3=E3, E4=E4, E5=E5,
+        energy_gamma=energy_gamma, energy_q=energy_q,
+        unexplained=unexplained, q_h_rate=q_h_rate, u_before_lead=u_before_lead, lead_rate=lead_rate,
+    )  # fmt: skip
 
 
 @compiled
 def _initial(own, z_d, gamma_d, theta_d, q_d, u_l):
-    adapted, integral = (0.0, 0.0, 0.0), 0.0
-    filters = (own.theta, 0.0, 0.0, 0.0, own.z, 0.0, z_d, 0.0)
-    estimator = (own.q, -own.elevator)
-    return State(z_d, gamma_d, theta_d, q_d, *adapted, integral, *filters, *estimator, u_l, own.V, own.t)
+    return State(
+        z_d=z_d, gamma_d=gamma_d, theta_d=theta_d, q_d=q_d,
+        F_gamma=0.0, F_q=0.0, zeta=0.0, integral=0.0,
+        theta_f=own.theta, theta_f_rate=0.0, u_f=0.0, u_f_rate=0.0,
+        z_h=own.z, v_f=0.0, z_r=z_d, v_r=0.0,
+        q_h=own.q, u_s=-own.elevator, u_l=u_l, V_before=own.V, t_start=own.t,
+    )  # fmt: skip
 
 
 @compiled
@@ -424,8 +423,11 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
     """`SIGNALS` for the instant of ``state``."""
     z_r = state.z_r if gains.smoother > 0.0 else state.z_d
     z_h = state.z_h if gains.altitude_filter > 0.0 else own.z
-    tube = (output.error, output.width, output.transformed)
-    return (state.z_d, z_r, z_h, *tube, *state[1:7], output.unexplained, output.elevator_wanted)
+    return (
+        state.z_d, z_r, z_h, output.error, output.width, output.transformed,
+        state.gamma_d, state.theta_d, state.q_d, state.F_gamma, state.F_q, state.zeta,
+        output.unexplained, output.elevator_wanted,
+    )  # fmt: skip
 
 
 def climb_limit(gains: Gains) -> float:
