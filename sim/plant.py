@@ -9,12 +9,16 @@ from typing import NamedTuple
 
 __all__ = ["DIVERGED", "LOST", "TRUTH", "UNITS", "Guards"]
 
-TRUTH = ("x", "y", "z", "V", "gamma", "chi", "mu", "alpha", "beta", "theta", "p", "q", "r")
-"""Order of the truth vector: altitude z up, angles rad, rates rad/s."""
+UNITS = {
+    "x": "m", "y": "m", "z": "m", "V": "m/s",
+    "gamma": "rad", "chi": "rad", "mu": "rad", "alpha": "rad", "beta": "rad", "theta": "rad",
+    "p": "rad/s", "q": "rad/s", "r": "rad/s",
+}  # fmt: skip
+"""Channels of the truth vector and their units, in its order; altitude z is up."""
 
-UNITS = dict(zip(TRUTH, ("m", "m", "m", "m/s") + ("rad",) * 6 + ("rad/s",) * 3, strict=True))
+TRUTH = tuple(UNITS)
 
-X, Y, Z, V, GAMMA, CHI, MU, ALPHA, BETA, THETA, P, Q, R = range(13)
+X, Y, Z, V, GAMMA, CHI, MU, ALPHA, BETA, THETA, P, Q, R = range(len(TRUTH))
 
 DIVERGED = 5
 """Key of `LOST`: the law's command is not finite."""

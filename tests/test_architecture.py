@@ -185,20 +185,45 @@ def column_numbers(text: str) -> Iterator[tuple[int, int]]:
                         yield node.lineno, number.value
 
 
-VECTORS_OF_LAWS = {REPOSITORY / "airside" / "schemes", REPOSITORY / "airside" / "elements"}
-"""Their columns belong to one law, or to one element, and are named in its file."""
-
-
 @pytest.mark.parametrize("wing", ["link", "sim", "airside"])
 def test_columns_are_read_by_their_names(wing):
     """By `fields`, or by constants made of ``_fields``: a field that moves must not make another number fly."""
     found = [
         f"{path}:{line} has the literal subscript {number}"
         for path in sources(wing)
-        if path.parent not in VECTORS_OF_LAWS
         for line, number in column_numbers(path.read_text(encoding="utf-8"))
     ]
     assert not found, "\n".join(found)
+
+
+MOST_POSITIONS = 6
+"""Fields that a record of a law may be given by position; an order error of more is a silent error of physics."""
+
+
+def given_by_position(text: str) -> Iterator[tuple[int, str]]:
+    """Line and name of every `State` or `Output` that is made by position, or that is cut into slices."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("State", "Output"):
+            starred = any(isinstance(argument, ast.Starred) for argument in node.args)
+            if starred or len(node.args) > MOST_POSITIONS:
+                yield node.lineno, node.func.id
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice) and isinstance(node.value, ast.Name):
+            if node.value.id in ("state", "s", "output", "law"):
+                yield node.lineno, node.value.id
+
+
+def test_laws_name_their_states_and_outputs():
+    found = [
+        f"{path}:{line}: {name} by position"
+        for path in sources("airside/schemes")
+        for line, name in given_by_position(path.read_text(encoding="utf-8"))
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_a_state_by_position_is_found():
+    text = "State(*a, b)\nOutput(1, 2, 3, 4, 5, 6, 7)\nstate[4:14]\nState(x=1, y=2)\nOutput(1, 2)\nheard[1:]"
+    assert [line for line, _ in given_by_position(text)] == [1, 2, 3]
 
 
 def test_a_column_number_is_found():

@@ -283,10 +283,11 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
         for name in Start.model_fields:
             if name not in plant.START and getattr(start, name) is not None:
                 findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
+    deviations = plan.noise.deviations
     for name in plant.COMPLETED:
         # Of pitch angle and angle of attack either may be the one that is measured.
-        instead = name == "alpha" and plan.noise.theta == 0.0
-        if getattr(plan.noise, name) * plan.noise.factor > 0.0 and not instead:
+        instead = name == "alpha" and deviations["theta"] == 0.0
+        if deviations[name] > 0.0 and not instead:
             findings.refuse(f"noise.{name}: follows from the other channels as measured; give those")
     channels = [name for name, _ in plant.DISTURBANCES]
     for n, disturbance in enumerate(plan.disturbances):

@@ -120,7 +120,7 @@ def _aircraft(
         initial = tuple(plant.initial(start, steady)) if steady else initial
     except ValueError as error:
         findings.refuse(f"start of UAV {uav}: {error}")
-    noise, throttle = plan.noise, plan.plant.autothrottle
+    throttle, noise = plan.plant.autothrottle, plan.noise.deviations
     return VehicleSpec(
         uav=uav,
         kind="aircraft",
@@ -142,7 +142,7 @@ def _aircraft(
         faults=actuator_faults(plan, uav),
         navigation_faults=navigation_faults(plan, uav),
         disturbances=_disturbances(plan, plant, uav),
-        noise=tuple(float(getattr(noise, name, 0.0)) * noise.factor for name in TRUTH),
+        noise=tuple(noise[name] for name in TRUTH),
         guards=_guards(plan),
         offset=start.get("y", 0.0),
         autothrottle=NO_AUTOTHROTTLE if throttle is None else Autothrottle(**throttle.model_dump()),

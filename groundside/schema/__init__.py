@@ -3,9 +3,8 @@
 `scenario` reads the files and merges forms and variants; `mission` turns the result into what the processes are told.
 """
 
-from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, RateLimits, Start, record_of
+from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, PointMassSheet, RateLimits, Start, record_of
 from ftcc.groundside.schema.base import Id, Strict
-from ftcc.groundside.schema.fire import PointMassSheet
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
 from ftcc.groundside.schema.plan import Claim, Plan, Rates, fields_of
 from ftcc.groundside.schema.references import LeaderFields

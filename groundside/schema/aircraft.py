@@ -3,41 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ftcc.groundside.schema.base import Actuator, Id, Positive, Strict
+from ftcc.groundside.schema.base import Actuator, Id, Positive, Strict, extended
 from ftcc.link.airframe import Airframe, PointMass, parameters
 
-__all__ = ["AirframeSheet", "Damping", "Lag", "Plant", "RateLimits", "Start", "Starts", "record_of"]
+__all__ = ["AirframeSheet", "Damping", "Lag", "Plant", "PointMassSheet", "RateLimits", "Start", "Starts", "record_of"]
 
 
-Sheet = TypeVar("Sheet", bound=Strict)
 Record = TypeVar("Record", Airframe, PointMass)
 
 
-def lists_parameters_of(record: Any) -> Callable[[type[Sheet]], type[Sheet]]:
-    """Class decorator: a sheet with a field for each parameter of a record of `ftcc.link.airframe`."""
-
-    def extend(sheet: type[Sheet]) -> type[Sheet]:
-        fields: Any = {
-            name: (
-                float,
-                Field(
-                    gt=parameter.above if math.isfinite(parameter.above) else None,
-                    ge=parameter.least if math.isfinite(parameter.least) else None,
-                    description=f"{parameter.unit}, {parameter.meaning}",
-                ),
-            )
-            for name, parameter in parameters(record).items()
-        }
-        return create_model(
-            sheet.__name__, __base__=sheet, __module__=sheet.__module__, __doc__=sheet.__doc__, **fields
+def _fields_for(record: Any) -> dict[str, Any]:
+    """A field of a sheet for each parameter of a record of `ftcc.link.airframe`."""
+    return {
+        name: (
+            float,
+            Field(
+                gt=parameter.above if math.isfinite(parameter.above) else None,
+                ge=parameter.least if math.isfinite(parameter.least) else None,
+                description=f"{parameter.unit}, {parameter.meaning}",
+            ),
         )
-
-    return extend
+        for name, parameter in parameters(record).items()
+    }
 
 
 def record_of(sheet: BaseModel, record: type[Record]) -> Record:
@@ -45,12 +36,20 @@ def record_of(sheet: BaseModel, record: type[Record]) -> Record:
     return record(**{name: float(getattr(sheet, name)) for name in record._fields})
 
 
-@lists_parameters_of(Airframe)
+@extended(_fields_for(Airframe))
 class AirframeSheet(Strict):
     """An airframe's coefficients: the fields of `Airframe`, by name."""
 
     title: str = ""
     T_max: Positive = Field(description="N, full thrust of the engine, eq. (2.6)")
+
+
+@extended(_fields_for(PointMass))
+class PointMassSheet(Strict):
+    """An aircraft as a point: the fields of `PointMass`, by name."""
+
+    title: str = ""
+    T_max: Positive = Field(description="N, full thrust of the engine")
 
 
 class Lag(Strict):

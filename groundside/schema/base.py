@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
-__all__ = ["Actuator", "Id", "NotNegative", "Positive", "Probability", "Strict", "check_end"]
+__all__ = ["Actuator", "Id", "NotNegative", "Positive", "Probability", "Strict", "check_end", "extended"]
 
 Id = Annotated[int, Field(ge=1, le=200)]
 """MAVLink system id of a UAV."""
@@ -20,6 +21,19 @@ class Strict(BaseModel):
     """Fields that are not listed, nan and inf are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Table = TypeVar("Table", bound=Strict)
+
+
+def extended(fields: Mapping[str, Any]) -> Callable[[type[Table]], type[Table]]:
+    """Class decorator: the table with ``fields`` (by name: type and `Field`) behind its own, as pydantic makes them."""
+
+    def extend(table: type[Table]) -> type[Table]:
+        described: dict[str, Any] = {"__base__": table, "__module__": table.__module__, "__doc__": table.__doc__}
+        return create_model(table.__name__, **described, **fields)  # type: ignore[no-any-return]
+
+    return extend
 
 
 def check_end(at: float, until: float | None) -> None:

@@ -1,4 +1,4 @@
-"""What may stand in a scenario of chapter 9: the fire and the posts around it, and its point-mass aircraft."""
+"""What may stand in a scenario of chapter 9: the fire and the posts around it."""
 
 from __future__ import annotations
 
@@ -6,19 +6,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.aircraft import lists_parameters_of
 from ftcc.groundside.schema.base import Id, Positive, Strict, check_end
-from ftcc.link.airframe import PointMass
 
-__all__ = ["FireEventFields", "FireFields", "PointMassSheet", "PostFields"]
-
-
-@lists_parameters_of(PointMass)
-class PointMassSheet(Strict):
-    """An aircraft as a point: the fields of `PointMass`, by name."""
-
-    title: str = ""
-    T_max: Positive = Field(description="N, full thrust of the engine")
+__all__ = ["FireEventFields", "FireFields", "PostFields"]
 
 
 class PostFields(Strict):

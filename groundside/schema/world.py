@@ -6,7 +6,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from ftcc.groundside.schema.base import Actuator, Id, Probability, Strict, check_end
+from ftcc.groundside.schema.base import Actuator, Id, Probability, Strict, check_end, extended
+from ftcc.sim.plant import UNITS
 
 __all__ = ["DisturbanceFields", "FaultFields", "HomeFields", "NoiseFields", "ObstacleFields"]
 
@@ -123,20 +124,16 @@ class HomeFields(Strict):
     )
 
 
+@extended({name: (float, Field(0.0, ge=0.0, description=unit)) for name, unit in UNITS.items()})
 class NoiseFields(Strict):
-    """White measurement noise: standard deviation of each channel at every sample."""
+    """White measurement noise: standard deviation of each channel at every sample.
+
+    In the vertical plane either ``alpha`` or ``theta`` is given: the one follows from the other.
+    """
 
     factor: float = Field(1.0, ge=0.0, description="multiplies all of them")
-    x: float = Field(0.0, ge=0.0, description="m")
-    y: float = Field(0.0, ge=0.0, description="m")
-    z: float = Field(0.0, ge=0.0, description="m")
-    V: float = Field(0.0, ge=0.0, description="m/s")
-    gamma: float = Field(0.0, ge=0.0, description="rad")
-    chi: float = Field(0.0, ge=0.0, description="rad")
-    mu: float = Field(0.0, ge=0.0, description="rad")
-    alpha: float = Field(0.0, ge=0.0, description="rad; in the vertical plane either this or theta")
-    beta: float = Field(0.0, ge=0.0, description="rad")
-    theta: float = Field(0.0, ge=0.0, description="rad")
-    p: float = Field(0.0, ge=0.0, description="rad/s")
-    q: float = Field(0.0, ge=0.0, description="rad/s")
-    r: float = Field(0.0, ge=0.0, description="rad/s")
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviation by channel, times the factor."""
+        return {name: float(getattr(self, name)) * self.factor for name in UNITS}

@@ -89,7 +89,7 @@ Parameters = Airframe
 ACTUATORS = ("thrust", "elevator", "aileron", "rudder")
 COMPLETED = ("theta",)
 SERVES = ("attitude", "longitudinal")
-START = ("V", "x", "y", "z", "gamma", "theta", "q", "chi", "mu", "alpha", "beta", "p", "r")
+START = (*State._fields, "theta")
 
 
 @compiled

@@ -73,7 +73,7 @@ ACTUATORS = ("thrust", "elevator")
 DISTURBANCES = (("d1", "m/s^2"), ("d2", "rad/s"), ("d3", "rad/s^2"), *AIR_CHANNELS)
 COMPLETED = ("alpha",)
 SERVES = ("longitudinal",)
-START = ("V", "x", "y", "z", "gamma", "theta", "q")
+START = (*State._fields, "y")
 
 
 @compiled_apart
