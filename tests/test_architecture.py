@@ -207,9 +207,9 @@ def given_by_position(text: str) -> Iterator[tuple[int, str]]:
             starred = any(isinstance(argument, ast.Starred) for argument in node.args)
             if starred or len(node.args) > MOST_POSITIONS:
                 yield node.lineno, node.func.id
-        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice) and isinstance(node.value, ast.Name):
-            if node.value.id in ("state", "s", "output", "law"):
-                yield node.lineno, node.value.id
+        sliced = isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice)
+        if sliced and isinstance(node.value, ast.Name) and node.value.id in ("state", "s", "output", "law"):
+            yield node.lineno, node.value.id
 
 
 def test_laws_name_their_states_and_outputs():
