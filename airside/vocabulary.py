@@ -55,23 +55,23 @@ ATTITUDE_TRACKING = (
     Q("alpha - alpha_d", "rad", "angle of attack off its reference", bound=math.radians(3.0)),
     Q("beta - beta_d", "rad", "sideslip off its reference", bound=math.radians(3.0)),
 )
-"""What a law of attitude shall make small."""
+"""Errors that a law of attitude must make small, with the size that counts as small."""
 
 ALTITUDE_MOTION = (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate"))
-"""What a leader tells of its altitude."""
+"""Altitude as a leader shares it."""
 PLANE_MOTION = (Q("x", "m", "forward position"), Q("x_dot", "m/s", "forward speed"), *ALTITUDE_MOTION)
-"""What a leader tells of its place in the vertical plane."""
+"""Motion in the vertical plane as a leader shares it."""
 ACCELERATED_MOTION = (
     Q("V", "m/s", "airspeed"),
     Q("V_dot", "m/s^2", "acceleration; a follower's is modelled"),
     *ALTITUDE_MOTION,
 )
-"""What neighbours tell of their speed and altitude."""
+"""Speed and altitude as neighbours share them."""
 LONGITUDINAL_DISTURBANCES = (
     Q("d1_hat", "m/s^2", "estimated disturbance of the airspeed"),
     Q("d2_hat", "rad/s", "estimated disturbance of the flight path"),
     Q("lumped_hat", "rad/s^2", "estimated effect of fault and disturbance on the pitch rate"),
 )
-"""What disturbance observers of speed, flight path and pitch rate find."""
+"""Estimates of the disturbance observers of speed, flight path and pitch rate."""
 THRUST_WANTED = Q("thrust_wanted", "N", "thrust command before saturation")
 ELEVATOR_WANTED = Q("elevator_wanted", "rad", "elevator command before saturation")

@@ -1,5 +1,5 @@
-"""Elements of fault-tolerant control: what recurs in the schemes, each once, each with its equations.
+"""Elements of fault-tolerant control: the parts that several schemes share. Each stands once, with its equations.
 
-An element is a compiled function of scalars. Where it has states it returns their rates, and the law integrates them,
-unless a stiff element says that it steps itself.
+An element is a compiled function of scalars or of vectors of three. An element with states returns their rates, and the
+law integrates them; a stiff element says that it steps itself.
 """

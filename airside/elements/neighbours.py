@@ -1,4 +1,4 @@
-"""What a UAV makes of its neighbours' records: carried to the present, compared, averaged."""
+"""Records of the neighbours: extrapolated to the present, compared with the own value, averaged."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _axes(row, first):
 
 @compiled
 def extrapolated(value, rate, age, horizon):
-    """A neighbour's value carried to the present by the rate it sent, for at most ``horizon`` seconds."""
+    """A neighbour's value, extrapolated to the present by the rate that it sent, for at most ``horizon`` seconds."""
     return value + rate * min(age, horizon)
 
 
@@ -33,9 +33,9 @@ def extrapolated(value, rate, age, horizon):
 def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):
     """sum_j a_ij (estimate - x_j), sum_j a_ij and sum_j a_ij x_j' over the neighbours, eqs. (3.20), (5.12).
 
-    x_j and its rate are the first two values of a record, carried to the present, and ``ahead`` seconds beyond it, for
-    at most ``horizon`` seconds. A neighbour not heard yet counts as ``unheard`` at rest, or is left out if
-    ``leave_out`` > 0.
+    x_j and its rate are the first two values of a record. x_j is extrapolated to the present and ``ahead`` seconds
+    further, for at most ``horizon`` seconds. A neighbour not heard yet counts as ``unheard`` at rest, or is left out
+    if ``leave_out`` > 0.
     """
     total = 0.0
     weights = 0.0
@@ -60,8 +60,8 @@ def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):
 def weighted_average(heard, column, oldest, horizon):
     """Average of the neighbours' value in ``column`` and of its rate in the next one, eqs. (4.10), (4.11).
 
-    Values are carried to the present by their rates, for at most ``horizon`` seconds; a neighbour whose record is older
-    than ``oldest`` seconds, or who was never heard, is left out.
+    Values are extrapolated to the present by their rates, for at most ``horizon`` seconds. A neighbour is left out if
+    its record is older than ``oldest`` seconds, or if it was never heard.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def weighted_average(heard, column, oldest, horizon):
 def motion_sums(heard, column, carried):
     """sum_j a_ij, sum_j a_ij x_j at present and sum_j a_ij x_j', for x_j in ``column`` and its rate in the next one.
 
-    ``carried`` = 1 carries each x_j to the present by its rate, 0 holds it as it was sent. With the sums,
+    ``carried`` = 1 extrapolates each x_j to the present by its rate, 0 holds it as it was sent. With the sums,
     sum_j a_ij (x - x_j) = weights x - positions, which moves on by ``rates`` within a control step, eqs. (6.22)-(6.23).
     A neighbour takes part from its first record on, however old.
 

@@ -1,4 +1,4 @@
-"""Prescribed performance: a tube that an error must not leave, and the error transformed so that its walls are far."""
+"""Prescribed performance: a tube that an error must not leave, and an error transform whose walls are at infinity."""
 
 from __future__ import annotations
 

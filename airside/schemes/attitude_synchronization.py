@@ -1,22 +1,23 @@
 """Decentralized attitude synchronization with prescribed performance.
 
 Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, chapter 7;
-equation numbers are the monograph's. Each UAV tracks its own bank, angle of attack and sideslip and stays synchronized
-with its neighbours' tracking errors, inside a decaying funnel, in spite of faults of all three surfaces and of errors
-in the aerodynamic coefficients. There is no leader.
+equation numbers are the monograph's. Each UAV tracks its own references of bank, angle of attack and sideslip, and
+keeps its tracking errors close to those of its neighbours, inside a decaying funnel. The law tolerates faults of all
+three surfaces and errors of the aerodynamic coefficients. There is no leader.
 
 The networks' inputs, centres and widths are chosen: the monograph gives none. sign() is tanh(./phi_s). The `monograph`
 form is the printed law. Departures of the `flight` form, each a gain that the other leaves off:
-- neighbours' errors, held between messages, pass a critically damped filter whose rate replaces the sent one;
-- feed-forward of what the kinematics do not explain of the attitude's rate;
-- an observer of what the nominal model does not explain of the body rates' acceleration;
-- caps on the gains that the adaptive terms add, which sampling cannot follow;
-- less coupling of the attitude errors into the auxiliary system of the rates;
+- neighbours' errors are held between messages and pass a critically damped filter; its rate replaces the sent one;
+- feed-forward of the attitude's rate that the kinematics do not explain;
+- an observer of the angular acceleration that the nominal model does not explain;
+- caps on the gains that the adaptive terms add: the sampled loop cannot follow larger ones;
+- a weaker coupling of the attitude errors into the auxiliary system of the rates;
 - a lead on the surfaces' commands against their lag.
 
-The differentiator is integrated in sub-steps over the tick behind, with its input ramped from sample to sample.
-`dynamic_surface` = 1 is the traditional law that the monograph compares with: a first-order filter, and neither funnel
-nor adaptive, auxiliary or finite-time terms.
+The differentiator is integrated in sub-steps over the last tick; its input is a ramp from sample to sample.
+`dynamic_surface` = 1 is the traditional law that the monograph compares with: a first-order filter, without funnel and
+without adaptive, auxiliary and finite-time terms. The file is longer than others: it holds two laws, and each part of a
+step is a function.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ __all__ = ["Gains", "Output", "State", "check", "observe", "share", "start", "st
 Q = Quantity
 
 MOST_NEIGHBOURS = 16
-"""Neighbours whose errors a UAV can filter."""
+"""Largest number of neighbours whose errors a UAV can filter."""
 
 
 class Gains(NamedTuple):
@@ -182,7 +183,7 @@ class State(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one evaluation of the law shows."""
+    """Commands first, then the other results of one evaluation of the law."""
 
     aileron: float
     elevator: float
@@ -252,7 +253,7 @@ _FEED_FORWARD_FILTER = 0.05
 _DYNAMIC_SURFACE = 0.05
 """Time constant of the traditional law's filter, s."""
 _FASTEST_OBSERVER, _SLOWEST_OBSERVER, _FASTEST_NEIGHBOURS = 0.4, 10.0, 20.0
-"""Where trouble begins, see `_sampled_well`: share of the control rate; rad/s; rad/s."""
+"""Limits, see `_sampled_well`: share of the control rate; rad/s; rad/s."""
 _FASTEST_LOW_PASS = math.sqrt(6.0) - math.sqrt(2.0)
 """w h at which the steps of (7.35) become unstable: 4 = 2 sqrt(2) w h + (w h)^2."""
 _ZERO = (0.0, 0.0, 0.0)
@@ -492,7 +493,7 @@ def _sent(state, u, low, high, gains, dt):
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
-    """One tick: the state ``dt`` later, and what is commanded and seen now."""
+    """One tick: the state ``dt`` seconds later, and the output now."""
     e, x2, reference_rate = attitude_error(own, reference), body_rates_of(own), reference_rates_of(reference)
     error = _synchronization_error(state, own, e, heard, gains, dt)
     nominal = _nominal(own, clip(own.beta, -_LARGEST_SIDESLIP, _LARGEST_SIDESLIP), model)
@@ -536,7 +537,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """The own tracking error, and its rate as the difference to the tick before."""
+    """Own tracking error, and its rate: the difference to the tick before."""
     e = attitude_error(own, reference)
     since = own.t - state.t
     e_dot = scaled(1.0 / since, turned(e, state.e)) if since > 0.0 else _ZERO
@@ -545,7 +546,7 @@ def share(state: State, own: Own, reference: Reference, output: Output, gains: G
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS`."""
+    """Values of `SIGNALS`."""
     return (
         reference.mu,
         reference.alpha,
@@ -561,7 +562,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = bounds_errors(gains, flight, _STEEPEST, _LOST)
     if gains.neighbour_filter > 0.0 and gains.substeps % 2 == 1:
         problems.append(Problem(False, f"gain substeps = {gains.substeps:g}: odd numbers make the rudder chatter"))
@@ -572,7 +573,7 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
 
 
 def _sampled_well(gains: Gains, period: float) -> list[Problem]:
-    """What observer and filters need of the control period (s).
+    """Limits on observer and filters from the control period (s).
 
     Measured at 200 Hz on the published faults (largest bank error from 3 s on, deg; mean change of the aileron's
     command per tick, deg):

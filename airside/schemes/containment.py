@@ -114,7 +114,7 @@ class State(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one evaluation of the law shows."""
+    """Commands first, then the other results of one evaluation of the law."""
 
     thrust: float
     elevator: float
@@ -308,13 +308,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """What the neighbours hear, for the instant of ``state``."""
+    """Values sent to the neighbours, at the time of ``state``, in the order of `SHARED`."""
     return state.zhat, (state.v_r if gains.shaper > 0.0 else output.zhat_rate)
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS` for the instant of ``state``."""
+    """Values of `SIGNALS`, at the time of ``state``."""
     return (
         state.zhat,
         state.z_r if gains.shaper > 0.0 else state.zhat,
@@ -360,7 +360,7 @@ def _starts(gains: Gains, flight: Flight) -> list[Problem]:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = above_leaders_climb(gains, "beta2", flight, "Theorem 5.1")
     if gains.in_flight == 0.0:
         problems += _starts(gains, flight)

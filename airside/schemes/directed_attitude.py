@@ -1,13 +1,15 @@
 """Decentralized attitude control over a directed graph.
 
 Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, chapter 8;
-equation numbers are the monograph's. Each UAV regulates a mixture of its own attitude error and of the differences to
-the errors of those whom it hears, inside a shrinking bound. Radial-basis networks and disturbance observers, one pair
-per loop, absorb unknown aerodynamics, loss of the surfaces' effectiveness and their bias. There is no leader.
+equation numbers are the monograph's. Each UAV regulates a weighted sum of its own attitude error and of its differences
+to the errors of its in-neighbours, inside a shrinking bound. Each of the two loops has a radial-basis network and a
+disturbance observer, which compensate unknown aerodynamics, loss of the surfaces' effectiveness and their bias. There
+is no leader.
 
-The chapter's table of parameters and its networks' layout are lost; those here are chosen. Departures from the print:
+The chapter's table of parameters and the layout of its networks are lost; those here are chosen. `step` follows the
+order of the chapter and is therefore long. Departures from the printed law:
 - the auxiliary signal enters (8.26) as k5 mu1/eta, which the proof needs (8.46), instead of k5 mu1;
-- floored denominators in the place of the auxiliary systems' freeze and reset (Remark 8.1);
+- floored denominators instead of the freeze and reset of the auxiliary systems (Remark 8.1);
 - the error that the transform sees is limited to a share of the bound, the virtual rate command to `rate_limit`;
 - one explicit Euler step per tick, but implicit ones for the auxiliary systems and the low-passed command, and an exact
   one for the first-order filter;
@@ -147,7 +149,7 @@ class State(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one evaluation of the law shows."""
+    """Commands first, then the other results of one evaluation of the law."""
 
     aileron: float
     elevator: float
@@ -280,10 +282,10 @@ def _frobenius(W):
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
-    """One tick: the state ``dt`` later, and what is commanded and seen now. All rates are those of the tick's start."""
+    """One tick: the state ``dt`` seconds later, and the output now. All rates are those at the start of the tick."""
     first = state.ticks == 0.0
     V = max(own.V, _LEAST_AIRSPEED)
-    # Where the measured bank jumps by a turn, prediction and observer go on.
+    # The measured bank may jump by a turn; prediction and observer must not.
     x1, x2 = nearest_turns(attitude_of(own), state.x1_hat), body_rates_of(own)
     reference_rate = reference_rates_of(reference)
     W1_norm, W2_norm = _frobenius(state.W1), _frobenius(state.W2)
@@ -364,13 +366,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """The own attitude error, and its rate as the predictor of the tick before had it."""
+    """Own attitude error, and its rate from the predictor of the tick before."""
     return attitude_error(own, reference) + state.error_rate
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS`."""
+    """Values of `SIGNALS`."""
     return (
         reference.mu,
         reference.alpha,
@@ -387,7 +389,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = bounds_errors(gains, flight, _STEEPEST, _LOST)
     try:
         flight.graph.require(Assumption.STRONGLY_CONNECTED)
@@ -400,7 +402,7 @@ def check(gains: Gains, flight: Flight) -> list[Problem]:
 
 
 def _sampled_well(gains: Gains, period: float) -> list[Problem]:
-    """What filter and observer need of the control period (s).
+    """Limits on filter and observer from the control period (s).
 
     Measured at 100 Hz on the published faults (largest bank error from 3 s on, deg; mean change of the aileron's
     command per tick, deg):

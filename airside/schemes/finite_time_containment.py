@@ -12,9 +12,11 @@ Departures from the printed law:
   the differentiators are chosen;
 - adapted gains and auxiliary systems are stepped semi-implicitly;
 - in the `flight` form (gains): adaptation held while its command is saturated, caps on the adapted gains, sub-steps;
-- neighbours are carried to the present by the velocity that they send, also within a control step: held positions would
-  bias the estimate by 55 mm per ms of age. With ideal exchange this adds nothing;
+- neighbours are extrapolated to the present by the velocity that they send, also within a control step: held positions
+  would bias the estimate by 55 mm per ms of age. With ideal exchange this adds nothing;
 - one-sample prediction of the measurement (gain ``prediction``), which a control rate of 100 Hz needs.
+
+The file is long because the law has twice as many gains and states as others, each with its unit and meaning.
 """
 
 from __future__ import annotations
@@ -409,13 +411,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """What the neighbours hear, for the instant of ``state``."""
+    """Values sent to the neighbours, at the time of ``state``, in the order of `SHARED`."""
     return state.x_hat, state.Vx_hat, state.z_hat, state.Vz_hat
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS` for the instant of ``state``."""
+    """Values of `SIGNALS`, at the time of ``state``."""
     s = state
     return (
         s.x_hat, s.Vx_hat, s.z_hat, s.Vz_hat,
@@ -426,7 +428,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = []
     if gains.beta4 <= flight.leader_acceleration:
         problems.append(

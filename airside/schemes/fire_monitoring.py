@@ -6,9 +6,9 @@ Its sections 9.1-9.3, equations (9.1)-(9.31), are not available to us: the law i
 leader: each UAV knows the fire, hence its own post (`ftcc.airside.references.position`); neighbours share tracking
 errors.
 
-Each UAV brings a cooperative error e to a fractional-order sliding surface S = e' + D^-a f(e), and takes off the
-disturbance that a reference system with a sliding-mode differentiator finds: faults of thrust, load factor and bank,
-wind and gust, what pushes the aircraft.
+Each UAV brings a cooperative error e to a fractional-order sliding surface S = e' + D^-a f(e). It compensates the
+disturbance that a reference system with a sliding-mode differentiator estimates: faults of thrust, load factor and
+bank, wind, gusts and other forces.
 
 Beyond the reconstruction of the printed law, each a gain:
 - limits on the error that the surface sees and on the commanded acceleration (Esat, Amax): without them a start tens of
@@ -18,9 +18,11 @@ Beyond the reconstruction of the printed law, each a gain:
 - the neighbours' commanded accelerations (the proof's term) left out but in the monograph form: sampled, they make the
   loop cycle.
 
-What fractional order buys: with the observer on nothing measurable; without it the memory acts as integral action and
-the residual error is 2.6 to 2.9 times smaller. What cooperation buys: a somewhat smaller cooperative error, at the
-price of moving the healthy aircraft. It does not bring two aircraft closer to each other's error.
+Fractional order has no measurable effect while the observer is on; without it the memory acts as integral action, and
+the residual error is 2.6 to 2.9 times smaller. Cooperation makes the cooperative error somewhat smaller, but moves the
+healthy aircraft; the errors of two aircraft do not come closer to each other.
+
+The file is long because vectors are tuples: each of the three axes is named where it is put together.
 """
 
 from __future__ import annotations
@@ -127,7 +129,7 @@ class State(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Commands first, then what else one step shows."""
+    """Commands first, then the other results of one step."""
 
     thrust: float
     load_factor: float
@@ -212,7 +214,7 @@ def _path(own):
 
 @compiled
 def _errors(own, reference):
-    """Position and velocity error at the stamp of the measurement."""
+    """Position error (m) and velocity error (m/s) at the time of the measurement."""
     place, planned = (own.x, own.y, own.z), (reference.x, reference.y, reference.z)
     planned_velocity = (reference.x_dot, reference.y_dot, reference.z_dot)
     return subtracted(place, planned), subtracted(velocity(*_path(own)), planned_velocity)
@@ -325,7 +327,7 @@ def _axis(s, axis, heard, error, rate, gains):
 
 @compiled
 def step(state: State, own: Own, heard: Heard, reference: Reference, model: Model, gains: Gains, dt: float):
-    """One tick."""
+    """One tick: the state ``dt`` seconds later, and the output now."""
     s = state
     set_poles(s.poles, gains.a, gains.p_min, gains.p_max, gains.per_decade, dt)
     error, rate = _errors(own, reference)
@@ -353,14 +355,14 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """What the neighbours hear: errors at the stamp of the measurement, the acceleration of the tick before."""
+    """Values sent to the neighbours: errors at the time of the measurement, the acceleration of the tick before."""
     error, rate = _errors(own, reference)
     return (*error, *rate, *state.a_own)
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS` for the instant of the measurement."""
+    """Values of `SIGNALS`, at the time of the measurement."""
     error, _ = _errors(own, reference)
     x, y, z = reference.x_dot, reference.y_dot, reference.z_dot
     return (

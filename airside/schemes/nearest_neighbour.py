@@ -1,9 +1,9 @@
 """Distributed fault-tolerant tracking of the nearest neighbours under actuator fault and input saturation.
 
 Source: Yu, Zhang, Jiang, Su: Fault-Tolerant Cooperative Control of Unmanned Aerial Vehicles, Springer 2024, sections
-4.1-4.5; equation numbers are the monograph's. Each follower takes the weighted mean of what its neighbours are doing
-(speed, altitude and their rates) as its reference and tracks it by dynamic surface control with disturbance observers,
-in spite of elevator faults, disturbances and saturation of thrust and elevator.
+4.1-4.5; equation numbers are the monograph's. Each follower takes the weighted mean of its neighbours' motion (speed,
+altitude and their rates) as its reference. It tracks this by dynamic surface control with disturbance observers, and
+tolerates elevator faults, disturbances and saturation of thrust and elevator.
 
 Departures from the printed law, each a gain that the `monograph` form leaves off:
 - guards: limits on the virtual controls. Without them a large altitude error saturates the elevator for long, the
@@ -163,8 +163,8 @@ TRACKING = (
 BRIEFED = True
 """The first tick already compares the own motion with the neighbours'."""
 SWEEPS = 200
-"""The acceleration that a follower shares depends on those that it hears: V' = P V' + ..., with eigenvalues of P inside
-the unit circle (0.83 on a ring of four). An ideal exchange is repeated until it is solved."""
+"""Most repetitions of an ideal exchange. The acceleration that a follower shares depends on those that it receives:
+V' = P V' + ..., with eigenvalues of P inside the unit circle (0.83 on a ring of four)."""
 GRAPH = Assumption.ONE_LEADER_UNDIRECTED
 COMMANDS = ("thrust", "elevator")
 PLANT = "longitudinal"
@@ -239,7 +239,7 @@ def _evaluate(s, own, V_id, z_id, V_d, V_d_rate, z_d, z_d_rate, model, gains, dt
         sent_thrust = clip(sent_thrust, model.thrust_min, model.thrust_max)
         sent_elevator = clip(sent_elevator, model.elevator_min, model.elevator_max)
 
-    # The acceleration that the neighbours are told.
+    # The acceleration sent to the neighbours.
     known_V_rate = f_v + g_v * acting_thrust
     V_rate = known_V_rate + d1_hat
     if gains.accelerometer > 0.0:
@@ -284,7 +284,7 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     """One tick: the state ``dt`` later (one Euler step from the states as they stand), and the output.
 
     At the first tick the filters are set: that of the reference at the neighbours' mean, those of the commands at what
-    they filter. Who knows of no neighbour takes his own speed and altitude for their mean.
+    they filter. A UAV that has heard no neighbour takes its own speed and altitude as their mean.
     """
     s = state
     # Nearest-neighbour reference (4.10), (4.11).
@@ -338,13 +338,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """What the neighbours hear, for the instant of ``state``."""
+    """Values sent to the neighbours, at the time of ``state``, in the order of `SHARED`."""
     return own.V, output.V_rate, own.z, own.V * math.sin(own.gamma)
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS` for the instant of ``state``."""
+    """Values of `SIGNALS`, at the time of ``state``."""
     V_tracked, z_tracked = own.V - output.S1, own.z - output.S2
     return (
         output.V_id, output.z_id, V_tracked, z_tracked, output.S1, output.S2,
@@ -355,7 +355,7 @@ def observe(state: State, own: Own, reference: Reference, output: Output, gains:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = []
     if gains.k32 < 5.9:
         problems.append(

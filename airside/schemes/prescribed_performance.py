@@ -16,7 +16,8 @@ Departures from the printed law, each a gain; the `monograph` form has only the 
 - limits on the virtual controls and on the adapted parameters: recovery from saturation instead of a limit cycle;
 - the speed integral held while the thrust command is saturated;
 - neighbours extrapolated by the rate that they send.
-Networks (sizes, centres, widths) are chosen; sign() is tanh(./phi).
+Networks (sizes, centres, widths) are chosen; sign() is tanh(./phi). The file is long because the law has many
+gains, states and conditions to check; `_evaluate` is the law itself, in the order of the chapter.
 """
 
 from __future__ import annotations
@@ -414,13 +415,13 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
 
 @compiled
 def share(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """What the neighbours hear, for the instant of ``state``."""
+    """Values sent to the neighbours, at the time of ``state``, in the order of `SHARED`."""
     return state.z_d, output.v_ref
 
 
 @compiled
 def observe(state: State, own: Own, reference: Reference, output: Output, gains: Gains):
-    """`SIGNALS` for the instant of ``state``."""
+    """Values of `SIGNALS`, at the time of ``state``."""
     z_r = state.z_r if gains.smoother > 0.0 else state.z_d
     z_h = state.z_h if gains.altitude_filter > 0.0 else own.z
     return (
@@ -436,7 +437,7 @@ def climb_limit(gains: Gains) -> float:
 
 
 def check(gains: Gains, flight: Flight) -> list[Problem]:
-    """Conditions on the gains that the chapter states, or that the sampled law needs."""
+    """Conditions on the gains, from the chapter or from the sampling of the law."""
     problems = []
     if gains.tube_first < gains.tube_last:
         problems.append(Problem(True, "gain tube_first: the tube must not widen, epsilon(0) >= epsilon(inf)"))
