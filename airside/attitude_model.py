@@ -27,6 +27,9 @@ __all__ = [
     "surfaces_of",
 ]
 
+_LEAST_COSINE = 0.05
+"""Guard of cos(gamma)."""
+
 
 @compiled
 def attitude_of(own):
@@ -129,7 +132,7 @@ def attitude_drift(V, gamma, attitude, thrust, divisor, a):
     turn = (lift * sm + side * cm + thrust * (sa * sm - ca * sb * cm)) / momentum
     climb = (lift * cm - side * sm + thrust * (ca * sb * sm + sa * cm)) / momentum - a.g * cg / divisor
     return (
-        turn * (sg / clip(cg, 0.05, 1.0) + sm * tb) + climb * cm * tb,
+        turn * (sg / clip(cg, _LEAST_COSINE, 1.0) + sm * tb) + climb * cm * tb,
         -(turn * sm + climb * cm) / cb,
         turn * cm - climb * sm,
     )

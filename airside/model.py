@@ -15,6 +15,11 @@ from ftcc.link.compiled import compiled
 
 __all__ = ["Model", "airspeed_model", "flight_path_model", "level_deflections", "pitch_rate_model"]
 
+_LARGEST_ALPHA = 1.0
+"""Guard of the angle of attack, rad."""
+_LEAST_AIRSPEED = 1.0
+"""Guard of the airspeed in level flight, m/s."""
+
 
 @with_inherited_fields
 class Model(Airframe):
@@ -34,10 +39,10 @@ class Model(Airframe):
 
 @compiled
 def airspeed_model(V, gamma, alpha, a):
-    """f_v (m/s^2) and g_v (1/kg) of V' = f_v + g_v T; abs(alpha) is taken as at most 1 rad in g_v."""
+    """f_v (m/s^2) and g_v (1/kg) of V' = f_v + g_v T; in g_v abs(alpha) is at most `_LARGEST_ALPHA`."""
     lifting = 0.5 * a.rho * V * V * a.S
     drift = -lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha) / a.m - a.g * math.sin(gamma)
-    return drift, math.cos(clip(alpha, -1.0, 1.0)) / a.m
+    return drift, math.cos(clip(alpha, -_LARGEST_ALPHA, _LARGEST_ALPHA)) / a.m
 
 
 @compiled
@@ -57,8 +62,8 @@ def pitch_rate_model(V, alpha, q, divisor, a):
 
 
 def level_deflections(V: float, a: Model) -> dict[str, float]:
-    """What thrust (N) and elevator (rad) level flight at airspeed ``V`` (m/s) needs, by the nominal model."""
-    lifting = 0.5 * a.rho * max(V, 1.0) ** 2 * a.S
+    """Thrust (N) and elevator (rad) of level flight at airspeed ``V`` (m/s), by the nominal model."""
+    lifting = 0.5 * a.rho * max(V, _LEAST_AIRSPEED) ** 2 * a.S
     # Here the elevator's lift counts: the pitching moment is balanced, Cm0 + Cma alpha + Cmde elevator = 0.
     share = a.CLde / a.Cmde
     alpha = (a.m * a.g / lifting - a.CL0 + share * a.Cm0) / (a.CLa - share * a.Cma)

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.scenario.loading import ScenarioError, load, shipped
+from ftcc.airside.schemes import find
+from ftcc.groundside.scenario.loading import ScenarioError, forms_and_variants, load, read, shipped
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation.one_process import fly_in_memory
 from ftcc.sim.airframe import Airframe
@@ -76,6 +77,24 @@ def test_a_flown_scenario_flies_again_as_it_was_flown(tmp_path: Path) -> None:
     assert resolve(load(tmp_path)).toml == flown.toml
     with pytest.raises(ScenarioError, match="form flight"):
         load(path, variants=["off"])
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_scenario_gives_no_gain_the_value_that_it_has_without(name: str) -> None:
+    """The gains of a form stand in its law; a scenario and its variants give what differs, and nothing else."""
+    document = read(shipped()[name])
+    forms, variants = forms_and_variants(document)
+    for form in forms:
+        plain = load(name, form=form)
+        scheme = find(plain.plan.scheme)
+        law = scheme.gains(form, {})._asdict()
+        assert [key for key, value in plain.plan.gains.common.items() if law[key] == value] == []
+        law |= plain.plan.gains.common
+        for variant, block in variants.items():
+            given = block.get("gains", {}) | block.get(form, {}).get("gains", {})
+            if list(block.get("forms", forms)) == [form]:
+                same = [key for key, value in given.items() if key != "uav" and law[key] == value]
+                assert same == [], f"variant {variant}"
 
 
 def test_the_demo_is_shipped_and_can_fly_without_a_warning() -> None:
