@@ -30,7 +30,7 @@ from tests.sitl.conftest import FTCC, Flight
 
 REPOSITORY = Path(__file__).parents[2]
 FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
-PAGES = [REPOSITORY / "README.md", *sorted(page for name in FOLDERS for page in (REPOSITORY / name).rglob("*.md"))]
+PAGES = sorted([*REPOSITORY.glob("*.md"), *(page for name in FOLDERS for page in (REPOSITORY / name).rglob("*.md"))])
 LAW = "airside/schemes/README.md"
 """Its programs are excerpts of the example's law."""
 
