@@ -57,6 +57,10 @@ NOT_RUN = {
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "ruff": "is a linter: .ci/run calls it",
+    "mypy": "is a type checker: .ci/run calls it",
+    "docs/architecture.md drawing": "is no text to type",
+    "docs/compiled.md drawing": "is no text to type",
     "docs/tick.md drawing": "is no text to type",
 }
 """What begins like that is not run, and why."""
