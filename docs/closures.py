@@ -52,9 +52,8 @@ def make_tick(step):
     return (lambda x, n: loop(step, x, n)), loop.stats
 """
 
-FUNCTION_TYPE = (
-    "step_type = numba.types.FunctionType(numba.float64(numba.float64))\n"
-    + ARGUMENT.replace("njit(", "njit(numba.float64(step_type, numba.float64, numba.int64), ")
+FUNCTION_TYPE = "step_type = numba.types.FunctionType(numba.float64(numba.float64))\n" + ARGUMENT.replace(
+    "njit(", "njit(numba.float64(step_type, numba.float64, numba.int64), "
 )
 
 TEMPLATE = """
