@@ -23,19 +23,21 @@ _COLUMNS_TO_CHOOSE = 6
 
 
 def airframe(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="A shipped airframe's name, or a TOML file.")] = (
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Name of a bundled airframe, or a TOML file.")] = (
         "reference_25kg"
     ),
     airspeed: Annotated[
-        list[float] | None, typer.Option(help="m/s; repeatable. Default: 18, 22, 25, 30 and 35.")
+        list[float] | None, typer.Option(help="Airspeed, m/s; can be repeated; default: 18, 22, 25, 30 and 35.")
     ] = None,
     coefficient: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=FACTOR", help="Multiply an aerodynamic coefficient, or all others; repeatable."),
+        typer.Option(
+            metavar="NAME=FACTOR", help="Multiply an aerodynamic coefficient, or all (all=FACTOR); can be repeated."
+        ),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the poles.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the poles into this file.")] = None,
 ) -> None:
-    """Show level trim and linear modes of an airframe, thrust and surfaces fixed."""
+    """Show level trim and linear modes of an airframe, with thrust and surfaces fixed."""
     from ftcc.groundside.scenario import load_airframe
     from ftcc.groundside.schema import AirframeSheet, record_of
     from ftcc.sim.airframe import Airframe, scaled
@@ -47,10 +49,10 @@ def airframe(
         if not (math.isfinite(V) and V > 0.0):
             fail(f"--airspeed {V:g}: must be a positive number of m/s")
     if len(speeds) > _COLUMNS_TO_CHOOSE:
-        fail(f"--airspeed: {len(speeds)} of them; at most {_COLUMNS_TO_CHOOSE} fit side by side")
+        fail(f"--airspeed: {len(speeds)} values; at most {_COLUMNS_TO_CHOOSE} fit side by side")
     sheet = load_airframe(name, Path("NAME"))
     if not isinstance(sheet, AirframeSheet):
-        fail(f"airframe = {name!r}: is a point mass, which has no attitude to trim and no modes")
+        fail(f"airframe = {name!r}: is a point mass; it has no attitude to trim and no linear modes")
     aircraft = record_of(sheet, Airframe)
     try:
         aircraft = scaled(aircraft, _factors(coefficient or []))

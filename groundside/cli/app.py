@@ -124,21 +124,23 @@ for _title, _commands in _SECTIONS.items():
 @app.callback(invoke_without_command=True)
 def _ftcc(
     ctx: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Show versions: of ftcc and of what it rests on.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the versions of ftcc and of the libraries it uses.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="With --version: as JSON.")] = False,
-    no_color: Annotated[bool, typer.Option("--no-color", help="Print without colours, as with NO_COLOR=1.")] = False,
+    no_color: Annotated[bool, typer.Option("--no-color", help="Print without colours, like NO_COLOR=1.")] = False,
 ) -> None:
     if no_color:
         # Every console asks for it, in whatever process.
         os.environ["NO_COLOR"] = "1"
     if json and not version:
-        fail("--json: belongs to --version here; a command that has it takes it behind its name")
+        fail("--json: here it belongs to --version; for a command, put it behind the command's name")
     if version:
         if ctx.invoked_subcommand is not None:
-            fail(f"--version: takes no command, here {ctx.invoked_subcommand}")
+            fail(f"--version: takes no command, but {ctx.invoked_subcommand} was given")
         show_versions(json)
     elif ctx.invoked_subcommand is None:
-        fail("a command is missing: `ftcc --help` lists them")
+        fail("no command given; `ftcc --help` lists them")
 
 
 def main() -> None:
@@ -156,4 +158,4 @@ def main() -> None:
     except OSError as error:
         if error.errno not in _NO_ROOM:
             raise
-        fail(f"{error.filename or 'a file'}: cannot be written: {error.strerror}; make room, or write elsewhere")
+        fail(f"{error.filename or 'a file'}: cannot be written: {error.strerror}; free some space, or write elsewhere")

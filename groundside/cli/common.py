@@ -54,21 +54,23 @@ ScenarioName = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
-        help="A shipped scenario's name, a TOML file, or a run to fly again.",
+        help="Name of a bundled scenario, a TOML file, or a run to fly again.",
         autocompletion=scenario_names,
     ),
 ]
-Form = Annotated[str | None, typer.Option(help="Form of the control law; default: the scenario's first.")]
+Form = Annotated[str | None, typer.Option(help="Form of the control law; default: the first one of the scenario.")]
 Variants = Annotated[str, typer.Option("--variant", metavar="A,B", help="Variants of the scenario.")]
 Duration = Annotated[float | None, typer.Option(help="Simulated time to fly, s.")]
-Seed = Annotated[int | None, typer.Option(help="Seed of losses, jitter and noise.")]
-Out = Annotated[Path | None, typer.Option(help="Folder of the run; default: runs/SCENARIO-TIME.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of packet losses, jitter, noise and turbulence.")]
+Out = Annotated[
+    Path | None, typer.Option(help="Folder for the results; default: runs/SCENARIO-TIME, or studies/SCENARIO-TIME.")
+]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a value of the scenario; repeatable."),
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Change a field of the scenario; can be repeated."),
 ]
 
-Strict = Annotated[bool, typer.Option("--strict", help="Exit code 3 where the verdict is 'failed'.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit with code 3 if the verdict is 'failed'.")]
 
 _FAILED = 3
 """Exit code of ``--strict``."""

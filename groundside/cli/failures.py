@@ -22,7 +22,7 @@ def failures(
         str | None,
         typer.Argument(
             metavar="[SCENARIO]",
-            help="What its aircraft have alone; without: which aircraft have what.",
+            help="Show only what the aircraft of this scenario have; default: all aircraft.",
             autocompletion=scenario_names,
         ),
     ] = None,
@@ -30,11 +30,11 @@ def failures(
     variant: Variants = "",
     settings: Settings = None,
 ) -> None:
-    """List everything that can be made to fail, and what MAV_CMD_INJECT_FAILURE means here."""
+    """List everything that can fail, and what MAV_CMD_INJECT_FAILURE means here."""
     from ftcc.link.failures import FAILURES, KINDS, SIZES, UNITS, parts_of
 
     if scenario is None and (form is not None or variant or settings):
-        fail("--form, --variant and --set need a scenario")
+        fail("--form, --variant and --set: need a scenario")
     there = None if scenario is None else _actuators(scenario, form, variant, settings)
     out = terminal()
     used = set()
@@ -56,9 +56,12 @@ def failures(
     out.print(sizes)
     if there is None:
         out.print()
-        out.print("[bold]Which aircraft have what[/]", highlight=False)
+        out.print("[bold]Actuators of each kind of aircraft[/]", highlight=False)
         out.print(_plants())
-    out.print("\nThey act at parameter FTCC_AT (simulated ms, 0 = at once), if SYS_FAILURE_EN is 1.", highlight=False)
+    out.print(
+        "\nFailures take effect at the parameter FTCC_AT (simulated ms, 0 = at once), if SYS_FAILURE_EN is 1.",
+        highlight=False,
+    )
     out.print("Leaders are reference points: only their radio can fail.", highlight=False)
 
 

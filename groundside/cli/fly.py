@@ -90,8 +90,8 @@ def _check_key(key: Path | None, systems: Iterable[int]) -> None:
         fail(f"--key {error}")
     if not all(memory.can_remember() for memory in memories):
         warn(
-            f"--key {key}: the time stamps of what is heard cannot be kept beside it: "
-            "commands of this flight could be repeated in the next one"
+            f"--key {key}: the time stamps of received messages cannot be saved beside it, "
+            "so commands of this flight could be replayed in the next one"
         )
 
 
@@ -104,7 +104,7 @@ def _check_systems(greatest: int, id_offset: int) -> None:
 def fly(
     scenario: Annotated[
         str,
-        typer.Argument(help="A shipped scenario or the path of a TOML file.", autocompletion=scenario_names),
+        typer.Argument(help="Name of a bundled scenario, or a TOML file.", autocompletion=scenario_names),
     ] = "demo",
     form: Form = None,
     variant: Variants = "",
@@ -112,34 +112,39 @@ def fly(
     seed: Seed = None,
     out: Out = None,
     settings: Settings = None,
-    speed: Annotated[str, typer.Option(help="Simulated seconds per second, at most, or 'max'.")] = "1",
+    speed: Annotated[str, typer.Option(help="Highest number of simulated seconds per second, or 'max'.")] = "1",
     clock: Annotated[
         str,
         typer.Option(
-            help="lockstep: all wait for each other, a slow computer flies slower; wall: who is late, is late."
+            help="lockstep: all processes wait for each other, so a slow computer only flies slower; "
+            "wall: nobody waits, and late commands are counted."
         ),
     ] = "lockstep",
-    hold: Annotated[bool, typer.Option("--hold", help="Stay at t = 0 until `ftcc resume`.")] = False,
-    viewer: Annotated[str, typer.Option(help="web, native or none.")] = "web",
-    browser: Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")] = True,
+    hold: Annotated[bool, typer.Option("--hold", help="Wait at t = 0 until `ftcc resume`.")] = False,
+    viewer: Annotated[str, typer.Option(help="Where to show the dashboard: web, native or none.")] = "web",
+    browser: Annotated[bool, typer.Option(help="Open the dashboard in the browser (web viewer).")] = True,
     pack: Annotated[str, typer.Option(help="Vehicles per process, or 'auto'.")] = "1",
-    port: Annotated[int | None, typer.Option(help="First port of the swarm's block; default: a free one.")] = None,
+    port: Annotated[int | None, typer.Option(help="First UDP port of the swarm; default: a free one.")] = None,
     mavlink: Annotated[
         list[str] | None,
-        typer.Option(metavar="HOST:PORT", help="Where a ground station listens, or none; default: 14550, 14540."),
+        typer.Option(
+            metavar="HOST:PORT", help="Address of a ground station, or none; can be repeated; default: 14550 and 14540."
+        ),
     ] = None,
-    key: Annotated[Path | None, typer.Option(help="Key file: sign the links to the ground, see `ftcc keys`.")] = None,
+    key: Annotated[
+        Path | None, typer.Option(help="Sign the links to the ground with this key file, see `ftcc keys`.")
+    ] = None,
     id_offset: Annotated[
-        int, typer.Option(help="Add this to the UAVs' ids in MAVLink, so that ground stations tell two swarms apart.")
+        int, typer.Option(help="Added to the MAVLink system ids, so that ground stations can tell two swarms apart.")
     ] = 0,
     strict: Strict = False,
 ) -> None:
-    """Fly a swarm: a vehicle and an autopilot process per UAV, MAVLink, the mesh, the dashboard."""
+    """Fly a swarm: a vehicle process and an autopilot process per UAV, with MAVLink, mesh and dashboard."""
     factor = speed_factor(speed, "--speed")
     _check_choices(clock, factor, viewer)
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     if not mission.wire:
-        fail(f"form {mission.form!r} has an ideal exchange and flies in one process only: use `ftcc simulate`")
+        fail(f"form {mission.form!r} has ideal exchange and flies in one process only; use `ftcc simulate`")
     count = _pack(pack, len(mission.vehicles))
     listeners = _listeners(mavlink)
     uavs = [spec.uav for spec in mission.vehicles]
@@ -173,7 +178,7 @@ def _check_choices(clock: str, factor: float, viewer: str) -> None:
     if clock not in get_args(Clock):
         fail(f"--clock {clock}: must be one of {', '.join(get_args(Clock))}")
     if clock == "wall" and math.isinf(factor):
-        fail("--clock wall --speed max: the wall clock needs a factor; as fast as possible flies --clock lockstep")
+        fail("--clock wall --speed max: the wall clock needs a factor; use --clock lockstep to fly as fast as possible")
     if viewer not in get_args(Viewer):
         fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
 
@@ -216,7 +221,7 @@ def _fly_on_the_terminal(mission: Mission, options: FlightOptions, ports: PortBl
         if address:
             bar.console.print(f"dashboard: {address}", soft_wrap=True)
         if options.held:
-            bar.console.print("held at t = 0: `ftcc resume` lets it fly")
+            bar.console.print("held at t = 0; start it with `ftcc resume`")
 
     title = f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {options.folder}"
     console.print(title, soft_wrap=True)

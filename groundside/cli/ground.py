@@ -37,17 +37,21 @@ __all__ = [
 
 _REFUSED = 1
 
-Swarm = Annotated[str | None, typer.Option("--swarm", help="Name of the swarm, see `ftcc ps`; needed if several run.")]
-Key = Annotated[Path | None, typer.Option("--key", help="Key file of signed links; default: that of the swarm.")]
-Uav = Annotated[int, typer.Argument(metavar="UAV", help="Id of a UAV.")]
-Other = Annotated[int | None, typer.Argument(metavar="[UAV]", help="The other end; without: all links of the UAV.")]
-At = Annotated[float | None, typer.Option(help="Simulated time at which it acts, s; default: at once.")]
+Swarm = Annotated[
+    str | None, typer.Option("--swarm", help="Name of the swarm, see `ftcc ps`; needed if several are running.")
+]
+Key = Annotated[Path | None, typer.Option("--key", help="Key file for signed links; default: the key of the swarm.")]
+Uav = Annotated[int, typer.Argument(metavar="UAV", help="Id of the UAV.")]
+Other = Annotated[
+    int | None, typer.Argument(metavar="[UAV]", help="The other end of the link; default: all links of the UAV.")
+]
+At = Annotated[float | None, typer.Option(help="Simulated time at which it takes effect, s; default: at once.")]
 
 link = typer.Typer(name="link", no_args_is_help=True, help="Cut, degrade and restore radio links.")
 param = typer.Typer(
-    name="param", no_args_is_help=True, help="Parameters: gains by their names, channel, sizes of failures, rates."
+    name="param", no_args_is_help=True, help="Read and set parameters: gains, channel, failure sizes, rates."
 )
-keys = typer.Typer(name="keys", no_args_is_help=True, help="Keys of signed links to the ground.")
+keys = typer.Typer(name="keys", no_args_is_help=True, help="Make keys for signed links to the ground.")
 
 
 @contextmanager
@@ -68,7 +72,7 @@ def _say(text: str) -> None:
 
 
 def vehicles(swarm: Swarm = None, key: Key = None) -> None:
-    """List the UAVs of a running swarm, the UDP port at which each is called, and what they tell of themselves."""
+    """List the UAVs of a running swarm, with the UDP port and the present state of each."""
     from rich.table import Table
 
     from ftcc.groundside.swarm import NoAnswerError
@@ -91,13 +95,13 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
 
 
 def commands() -> None:
-    """List the MAVLink commands and messages to a UAV, and what it does about each."""
+    """List the MAVLink commands and messages that a UAV accepts, and what it does about each."""
     from rich.table import Table
 
     from ftcc.airside.gcs import COMMANDS, MESSAGES
     from ftcc.link.mavlink import dialect
 
-    table = Table("MAV_CMD", "command", "what it does here", box=None)
+    table = Table("MAV_CMD", "command", "what the UAV does", box=None)
     for number, command in sorted(COMMANDS.items()):
         table.add_row(str(number), dialect.enums["MAV_CMD"][number].name.removeprefix("MAV_CMD_"), command.does)
     heard = Table("message", "answer", box=None)
@@ -105,35 +109,38 @@ def commands() -> None:
         heard.add_row(name, message.does)
     out = terminal()
     out.print(table)
-    out.print("\nAny other command is answered UNSUPPORTED. Messages:\n", highlight=False)
+    out.print("\nAny other command is answered with UNSUPPORTED. Messages:\n", highlight=False)
     out.print(heard)
-    out.print("\nAny other message is left alone.", highlight=False)
+    out.print("\nAny other message is ignored.", highlight=False)
 
 
 def fault(
     uav: Uav,
     what: Annotated[
         str,
-        typer.Argument(help="aileron, elevator, rudder, thrust; bank, load_factor; position, attitude (navigation)."),
+        typer.Argument(help="What fails: aileron, elevator, rudder, thrust, bank, load_factor, position or attitude."),
     ],
-    kind: Annotated[str, typer.Option(help="wrong, off, stuck, slow, intermittent.")] = "wrong",
-    effectiveness: Annotated[float | None, typer.Option(help="Remaining effectiveness, 0..1; default 1.")] = None,
-    bias: Annotated[float | None, typer.Option(help="rad, N, or g of a load factor.")] = None,
-    onset: Annotated[float | None, typer.Option(help="Rate of the exponential onset, 1/s; default: a step.")] = None,
-    slew: Annotated[float | None, typer.Option(help="Largest rate of a slow actuator, rad/s or N/s.")] = None,
-    period: Annotated[float | None, typer.Option(help="Of intermittent faults, s.")] = None,
-    duty: Annotated[float | None, typer.Option(help="Healthy share of the period, 0..1.")] = None,
-    size: Annotated[list[str] | None, typer.Option(metavar="FAIL_NAME=VALUE", help="Any other size.")] = None,
+    kind: Annotated[str, typer.Option(help="How it fails: wrong, off, stuck, slow or intermittent.")] = "wrong",
+    effectiveness: Annotated[float | None, typer.Option(help="Remaining effectiveness, 0 to 1; default: 1.")] = None,
+    bias: Annotated[float | None, typer.Option(help="Bias, in rad, N, or g for a load factor; default: 0.")] = None,
+    onset: Annotated[float | None, typer.Option(help="Rate of an exponential onset, 1/s; default: a step.")] = None,
+    slew: Annotated[float | None, typer.Option(help="Highest rate of a slow actuator, rad/s or N/s.")] = None,
+    period: Annotated[float | None, typer.Option(help="Period of an intermittent fault, s.")] = None,
+    duty: Annotated[float | None, typer.Option(help="Healthy share of the period, 0 to 1.")] = None,
+    size: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FAIL_NAME=VALUE", help="Any other failure size, see `ftcc failures`; can be repeated."),
+    ] = None,
     at: At = None,
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Make an actuator, or the navigation solution, of a UAV fail."""
+    """Inject a fault into an actuator or the navigation solution of a UAV."""
     sizes: dict[str, float] = {}
     if kind in ("wrong", "intermittent") and what not in ("position", "attitude"):
         sizes |= {"effectiveness": 1.0 if effectiveness is None else effectiveness, "bias": bias or 0.0}
         if effectiveness is None and bias is None:
-            fail(f"fault {what}: say how large it is: --effectiveness, --bias")
+            fail(f"fault {what}: its size is missing; give --effectiveness, --bias or both")
     if kind == "wrong" and what not in ("position", "attitude"):
         sizes |= {"effectiveness_onset": onset or 0.0, "bias_onset": onset or 0.0}
     sizes |= {name: value for name, value in (("slew", slew), ("period", period), ("duty", duty)) if value is not None}
@@ -155,7 +162,7 @@ def repair(
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Repair a UAV's actuators and navigation."""
+    """Repair the actuators and the navigation of a UAV."""
     with _station(swarm, key) as station:
         station.repair(uav, what, at=at)
     _say(f"UAV {uav}: {what or 'everything on board'} repaired")
@@ -166,17 +173,17 @@ def _ends(a: int, b: int | None) -> str:
 
 
 def _partial(problems: list[str], done: str) -> None:
-    """Say what was done, and at which of the ends it was not."""
+    """Print what was done, and warn about the ends where it was not."""
     _say(done)
     for problem in problems:
-        warn(f"not at both ends: {problem}")
+        warn(f"done at one end only: {problem}")
     if problems:
         raise typer.Exit(_REFUSED)
 
 
 @link.command("cut")
 def link_cut(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = None, key: Key = None) -> None:
-    """Cut the links between two UAVs, or switch the radio of one off."""
+    """Cut the links between two UAVs, or switch off the radio of one."""
     with _station(swarm, key) as station:
         problems = station.cut(uav, other, at=at)
     _partial(problems, f"{_ends(uav, other)} cut")
@@ -184,7 +191,7 @@ def link_cut(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = None, 
 
 @link.command("restore")
 def link_restore(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = None, key: Key = None) -> None:
-    """Restore the links between two UAVs, or those of one and its radio."""
+    """Restore the links between two UAVs, or the radio and all links of one."""
     with _station(swarm, key) as station:
         problems = station.restore(uav, other, at=at)
     _partial(problems, f"{_ends(uav, other)} restored")
@@ -194,17 +201,19 @@ def link_restore(uav: Uav, other: Other = None, at: At = None, swarm: Swarm = No
 def link_degrade(
     uav: Uav,
     other: Other = None,
-    loss: Annotated[float | None, typer.Option(help="Probability of loss.")] = None,
-    burst_start: Annotated[float | None, typer.Option(help="Probability per record of entering a burst.")] = None,
-    burst_end: Annotated[float | None, typer.Option(help="Probability per record of leaving it.")] = None,
-    burst_loss: Annotated[float | None, typer.Option(help="Probability of loss within a burst.")] = None,
-    delay: Annotated[float | None, typer.Option(help="s, beyond the link latency.")] = None,
-    jitter: Annotated[float | None, typer.Option(help="s, further delay, uniform.")] = None,
+    loss: Annotated[float | None, typer.Option(help="Probability that a record is lost, 0 to 1.")] = None,
+    burst_start: Annotated[
+        float | None, typer.Option(help="Probability per record that a burst of losses begins.")
+    ] = None,
+    burst_end: Annotated[float | None, typer.Option(help="Probability per record that the burst ends.")] = None,
+    burst_loss: Annotated[float | None, typer.Option(help="Probability that a record is lost in a burst.")] = None,
+    delay: Annotated[float | None, typer.Option(help="Delay beyond the link latency, s.")] = None,
+    jitter: Annotated[float | None, typer.Option(help="Further random delay, uniform from 0 to this value, s.")] = None,
     at: At = None,
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Degrade the links between two UAVs, or all of one."""
+    """Degrade the links between two UAVs, or all links of one."""
     names = ("loss", "burst_s", "burst_e", "burst_l", "delay", "jitter")
     given = zip(names, (loss, burst_start, burst_end, burst_loss, delay, jitter), strict=True)
     sizes = {name: value for name, value in given if value is not None}
@@ -215,9 +224,12 @@ def link_degrade(
 
 @param.command("get")
 def param_get(
-    uav: Uav, name: Annotated[str, typer.Argument(help="In any case of letters.")], swarm: Swarm = None, key: Key = None
+    uav: Uav,
+    name: Annotated[str, typer.Argument(help="Name of the parameter, in upper or lower case.")],
+    swarm: Swarm = None,
+    key: Key = None,
 ) -> None:
-    """Show the value in force."""
+    """Show the present value of a parameter."""
     with _station(swarm, key) as station:
         _say(f"{station.get(uav, name):.9g}")
 
@@ -225,12 +237,12 @@ def param_get(
 @param.command("set", context_settings={"ignore_unknown_options": True})  # values may be negative
 def param_set(
     uav: Uav,
-    name: Annotated[str, typer.Argument(help="In any case of letters.")],
-    value: Annotated[float, typer.Argument()],
+    name: Annotated[str, typer.Argument(help="Name of the parameter, in upper or lower case.")],
+    value: Annotated[float, typer.Argument(help="The new value.")],
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Set a parameter; refused values leave the one in force."""
+    """Set a parameter; if the value is refused, the present one is kept."""
     with _station(swarm, key) as station:
         _say(f"{name} = {station.set(uav, name, value):.9g}")
 
@@ -245,13 +257,13 @@ def param_list(uav: Uav, swarm: Swarm = None, key: Key = None) -> None:
 
 def leader(
     uav: Uav,
-    altitude: Annotated[float | None, typer.Option(help="m.")] = None,
-    speed: Annotated[float | None, typer.Option(help="m/s.")] = None,
+    altitude: Annotated[float | None, typer.Option(help="Altitude, m.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Speed, m/s.")] = None,
     at: At = None,
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Give a leader another altitude or speed."""
+    """Command a leader to another altitude or speed."""
     with _station(swarm, key) as station:
         station.lead(uav, altitude=altitude, speed=speed, at=at)
     asked = [f"{altitude:g} m"] if altitude is not None else []
@@ -261,13 +273,13 @@ def leader(
 
 def attitude(
     uav: Uav,
-    bank: Annotated[float, typer.Option(help="deg, about the velocity.")] = 0.0,
-    alpha: Annotated[float, typer.Option(help="deg, angle of attack.")] = 0.0,
-    beta: Annotated[float, typer.Option(help="deg, sideslip.")] = 0.0,
+    bank: Annotated[float, typer.Option(help="Bank angle about the velocity, deg.")] = 0.0,
+    alpha: Annotated[float, typer.Option(help="Angle of attack, deg.")] = 0.0,
+    beta: Annotated[float, typer.Option(help="Sideslip angle, deg.")] = 0.0,
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Have a UAV of an attitude scheme fly another attitude (mode offboard)."""
+    """Command a UAV of an attitude scheme to another attitude (mode offboard)."""
     with _station(swarm, key) as station:
         station.attitude(uav, bank=math.radians(bank), alpha=math.radians(alpha), beta=math.radians(beta))
     _say(f"UAV {uav}: bank {bank:g}, angle of attack {alpha:g}, sideslip {beta:g} deg")
@@ -275,7 +287,7 @@ def attitude(
 
 def ftc(
     uav: Uav,
-    state: Annotated[str, typer.Argument(metavar="on|off")],
+    state: Annotated[str, typer.Argument(metavar="on|off", help="on or off.")],
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
@@ -293,7 +305,7 @@ def mode(
     swarm: Swarm = None,
     key: Key = None,
 ) -> None:
-    """Set a UAV's mode: mission (the scheme flies), hold, offboard."""
+    """Set the mode of a UAV: mission (its scheme flies), hold or offboard."""
     with _station(swarm, key) as station:
         station.mode(uav, name)
     _say(f"UAV {uav}: mode {name}")
@@ -301,7 +313,7 @@ def mode(
 
 # The flow of time.
 
-_Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
+_Name = Annotated[str | None, typer.Argument(help="Name of the swarm, see `ftcc ps`; needed if several are running.")]
 _HOLDING = 10.0
 """Wall time within which a swarm must be held, s."""
 
@@ -326,39 +338,39 @@ def _wait_until_held(name: str | None) -> None:
         try:
             status = ask_swarm(find_swarm(name), "status")
         except (LookupError, OSError, RuntimeError) as error:
-            fail(f"the swarm has ended before it was held ({error})")
+            fail(f"the swarm ended before it could be paused ({error})")
         if status["state"] == "held":
-            _say(f"held at t = {as_seconds(round(status['t'] * 1e6))} s")
+            _say(f"paused at t = {as_seconds(round(status['t'] * 1e6))} s")
             return
         time.sleep(0.02)
-    fail(f"not held after {_HOLDING:g} s")
+    fail(f"the swarm was not paused within {_HOLDING:g} s")
 
 
 def pause(name: _Name = None) -> None:
-    """Hold a swarm: all its vehicles at the same tick."""
+    """Pause a running swarm, all vehicles at the same tick."""
     _tell(name, "pause")
     _wait_until_held(name)
 
 
 def step(
-    ticks: Annotated[int, typer.Argument(min=1, help="Ticks to fly.")] = 1,
+    ticks: Annotated[int, typer.Argument(min=1, help="Number of ticks.")] = 1,
     swarm: Swarm = None,
 ) -> None:
-    """Fly so many ticks of a swarm that is held, and hold it again."""
+    """Fly a paused swarm for some ticks, then pause it again."""
     _tell(swarm, "step", ticks=ticks)
     _wait_until_held(swarm)
 
 
 def resume(name: _Name = None) -> None:
-    """Let a swarm that is held go on, also one started with --hold."""
+    """Resume a swarm that was paused, or started with --hold."""
     _tell(name, "resume")
 
 
 def speed(
-    factor: Annotated[str, typer.Argument(help="Simulated seconds per second, or 'max'.")],
+    factor: Annotated[str, typer.Argument(help="Highest number of simulated seconds per second, or 'max'.")],
     swarm: Swarm = None,
 ) -> None:
-    """Change how fast a swarm flies."""
+    """Change the speed of a running swarm."""
     wanted = speed_factor(factor, "speed")
     _tell(swarm, "speed", factor=None if math.isinf(wanted) else wanted)
 
@@ -368,9 +380,11 @@ def speed(
 
 @keys.command("new")
 def keys_new(
-    file: Annotated[Path | None, typer.Argument(help="Default: in the user's configuration.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="Key file to make; default: in your configuration folder.")
+    ] = None,
 ) -> None:
-    """Make a key file for signed links: `ftcc fly --key FILE`."""
+    """Make a key file for signed links; use it with `ftcc fly --key FILE`."""
     from ftcc.link.signing import KeyFileError, default_key_file, new_key_file
 
     path = file or default_key_file()
@@ -378,4 +392,4 @@ def keys_new(
         new_key_file(path)
     except KeyFileError as error:
         fail(str(error))
-    _say(f"wrote {path}; its line is the pass phrase for other ground stations (MAVProxy: signing key PHRASE)")
+    _say(f"wrote {path}; its line is the pass phrase for other ground stations (in MAVProxy: signing key PHRASE)")

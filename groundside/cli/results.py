@@ -13,17 +13,17 @@ __all__ = ["compare", "report"]
 
 
 def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     json: Annotated[bool, typer.Option("--json", help="Print verdict and claims as JSON.")] = False,
-    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording as CSV.")] = None,
-    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the recording for MATLAB.")] = None,
-    kml: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the tracks for Google Earth.")] = None,
-    gpx: Annotated[Path | None, typer.Option(metavar="FILE", help="Export the tracks as GPX.")] = None,
-    ulog: Annotated[Path | None, typer.Option(metavar="DIR", help="Export a ULog file per UAV, as PX4 logs.")] = None,
-    page: Annotated[bool, typer.Option(help="Write RUN/report: a page with all figures.")] = True,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export all signals as CSV.")] = None,
+    mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export all signals for MATLAB.")] = None,
+    kml: Annotated[Path | None, typer.Option(metavar="FILE", help="Export a track per UAV for Google Earth.")] = None,
+    gpx: Annotated[Path | None, typer.Option(metavar="FILE", help="Export a track per UAV as GPX.")] = None,
+    ulog: Annotated[Path | None, typer.Option(metavar="DIR", help="Export a PX4 log (ULog) per UAV.")] = None,
+    page: Annotated[bool, typer.Option(help="Write RUN/report, a page with all figures.")] = True,
     strict: Strict = False,
 ) -> None:
-    """Show what a run recorded, its verdict and whether its scenario's claims hold; exit code 1 if one fails."""
+    """Show the verdict and the claims of a run, and write a page with its figures; exit code 1 if a claim fails."""
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import as_json, claims_of, show, write_report
     from ftcc.groundside.results import NothingRecordedError, Run, RunError, export
@@ -60,10 +60,12 @@ def report(
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of runs of one scheme.")],
-    out: Annotated[Path, typer.Option(help="Folder of the page and its figures.")] = Path("runs/compared"),
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN RUN...", help="Folders of two or more runs of one scheme.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the page and its figures.")] = Path("runs/compared"),
 ) -> None:
-    """Lay runs over each other: the same figures with a colour per run, and one table of claims."""
+    """Compare runs: the same figures with a colour per run, and one table of claims."""
     from rich.table import Table
     from rich.text import Text
 
@@ -71,7 +73,7 @@ def compare(
     from ftcc.groundside.results import Run, RunError
 
     if len(runs) < 2:
-        raise RunError("compare needs two runs or more")
+        raise RunError("compare: needs at least two runs")
     comparison = Comparison([Run(path) for path in runs])
     heads, rows = comparison.rows()
     table = Table(header_style="bold", pad_edge=False)

@@ -34,11 +34,11 @@ __all__ = ["check", "list_all", "simulate", "verify"]
 
 _SILENT = 10.0
 """Wall time after which a start that compiles says so, also where no bar is shown, s."""
-_COMPILING = "compiling, once for each version of the sources: half a minute, or minutes where the cores are busy"
+_COMPILING = "compiling, once per version of the sources: half a minute, or some minutes on a busy computer"
 
 
 def list_all() -> None:
-    """List schemes and shipped scenarios with their forms and variants."""
+    """List schemes and bundled scenarios, with their forms and variants."""
     from rich.table import Table
 
     from ftcc.airside import schemes
@@ -74,7 +74,7 @@ def check(
         typer.Option(metavar="KEY", help="Only show which file, block and line a value came from: plant.lag.thrust."),
     ] = None,
 ) -> None:
-    """Check a scenario without flying it: every case that it makes claims for, or the one that is asked for."""
+    """Check a scenario without flying it: all cases with claims, or the one that the options name."""
     from ftcc.groundside.scenario import resolve
     from ftcc.groundside.simulation import cases_of, load_case
 
@@ -146,7 +146,7 @@ def simulate(
     settings: Settings = None,
     strict: Strict = False,
 ) -> None:
-    """Fly a scenario in one process, as fast as this machine can, and record it."""
+    """Fly a scenario in one process, as fast as possible, and record it."""
     from rich.progress import BarColumn, Progress, TextColumn
 
     from ftcc.groundside.claims import evaluate
@@ -172,7 +172,7 @@ def simulate(
             run = simulate_mission(mission, folder, lambda t: progress.update(task, completed=t), ready)
         except OSError as error:
             raise RunError(
-                f"{folder}: cannot be written: {error.strerror or error}; make room, or give --out"
+                f"{folder}: cannot be written: {error.strerror or error}; free some space, or give --out"
             ) from None
         finally:
             compiling.cancel()
@@ -185,12 +185,13 @@ def simulate(
 def verify(
     scenario: ScenarioName,
     cases: Annotated[
-        list[str] | None, typer.Option("--case", metavar="CASE", help="Only this one, such as flight+off; repeatable.")
+        list[str] | None,
+        typer.Option("--case", metavar="CASE", help="Only this case, such as flight+off; can be repeated."),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Show the claims that hold, too.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="Also show the claims that hold.")] = False,
     settings: Settings = None,
 ) -> None:
-    """Fly every case that a scenario makes claims for, in one process, unrecorded; exit code 1 if a claim fails."""
+    """Check all claims of a scenario, in one process, without recording; exit code 1 if a claim fails."""
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import claims_table, summary
     from ftcc.groundside.simulation import cases_of, claims_in_flight, load_case

@@ -21,21 +21,19 @@ def study(
     scenario: ScenarioName,
     vary: Annotated[
         list[str] | None,
-        typer.Option(metavar="KEY.PATH=V1,V2", help="Values to fly; repeatable: every combination is flown."),
+        typer.Option(metavar="KEY.PATH=V1,V2", help="Values of a field; can be repeated: every combination is flown."),
     ] = None,
-    seeds: Annotated[int, typer.Option(help="Flights of each combination, with seeds counted up from --seed.")] = 1,
-    jobs: Annotated[int | None, typer.Option(help="Processes; default: one per core.")] = None,
+    seeds: Annotated[int, typer.Option(help="Flights per combination; seeds count up from --seed.")] = 1,
+    jobs: Annotated[int | None, typer.Option(help="Number of processes; default: one per core.")] = None,
     form: Form = None,
     variant: Variants = "",
     duration: Duration = None,
     seed: Seed = None,
     out: Out = None,
     settings: Settings = None,
-    record: Annotated[
-        bool, typer.Option("--record", help="Record every flight in OUT/runs, as simulate does.")
-    ] = False,
+    record: Annotated[bool, typer.Option("--record", help="Also record every flight, in OUT/runs.")] = False,
 ) -> None:
-    """Fly a scenario many times in memory, on all cores, over values of its settings and seeds of its chance."""
+    """Fly a scenario many times, on all cores, over settings and seeds."""
     from ftcc.groundside.results import new_folder
     from ftcc.groundside.study import plan_study
 

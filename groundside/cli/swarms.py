@@ -53,7 +53,7 @@ def ps() -> None:
     terminal().print(table)
 
 
-_Name = Annotated[str | None, typer.Argument(help="Name of the swarm as `ftcc ps` shows it; needed if several run.")]
+_Name = Annotated[str | None, typer.Argument(help="Name of the swarm, see `ftcc ps`; needed if several are running.")]
 
 
 def _tell(name: str | None, command: str) -> None:
@@ -68,8 +68,10 @@ def _tell(name: str | None, command: str) -> None:
         raise typer.Exit(1) from error
 
 
-def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all swarms.")] = False) -> None:
-    """End a running swarm in order; its run stays complete up to now."""
+def stop(
+    name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all running swarms.")] = False
+) -> None:
+    """Stop a running swarm; its results up to now are kept."""
     from ftcc.groundside.swarm import running_swarms
 
     names: list[str | None] = [entry.name for entry in running_swarms()] if every else [name]
@@ -79,19 +81,19 @@ def stop(name: _Name = None, every: Annotated[bool, typer.Option("--all", help="
 
 def doctor(
     scenario: Annotated[
-        str, typer.Argument(help="Scenario that is flown to measure.", autocompletion=scenario_names)
+        str, typer.Argument(help="Scenario to fly for the measurement.", autocompletion=scenario_names)
     ] = "demo",
     variant: Variants = "",
-    speed: Annotated[str, typer.Option(help="Times real time that are wanted, or 'max'.")] = "1",
+    speed: Annotated[str, typer.Option(help="The speed that you want, in times real time, or 'max'.")] = "1",
 ) -> None:
-    """Say what this machine has, and, by flying a scenario for some seconds, how fast it flies it."""
+    """Examine this computer, and fly a scenario for some seconds to measure how fast it flies here."""
     from ftcc.groundside.swarm import examine
 
     factor = speed_factor(speed, "--speed")
     mission = load_mission(scenario, None, variant, None, None, None)
     table = Table("what", "found", "verdict", box=None)
     console = terminal()
-    with console.status("looking around") as status:
+    with console.status("examining this computer") as status:
         for row in examine(mission, factor, progress=status.update):
             table.add_row(*map(escape, row))
     console.print(table)

@@ -23,8 +23,8 @@ _PAST_RATE, _PAST_PICTURES = 2.0, 400
 _PATIENCE = 20.0
 """Longest wait for a viewer that is still starting, s."""
 
-_Viewer = Annotated[str, typer.Option("--viewer", help="web or native.")]
-_Browser = Annotated[bool, typer.Option(help="Open the dashboard in a browser (web viewer).")]
+_Viewer = Annotated[str, typer.Option("--viewer", help="Where to show it: web or native.")]
+_Browser = Annotated[bool, typer.Option(help="Open the dashboard in the browser (web viewer).")]
 
 
 def _kind(viewer: str) -> Kind:
@@ -34,11 +34,13 @@ def _kind(viewer: str) -> Kind:
 
 
 def watch(
-    name: Annotated[str | None, typer.Argument(help="Name as `ftcc ps` shows it; needed if several fly.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Name of the swarm, see `ftcc ps`; needed if several are running.")
+    ] = None,
     viewer: _Viewer = "web",
     browser: _Browser = True,
 ) -> None:
-    """Show a running swarm, what it has flown and what it goes on to; Ctrl-C detaches, and the swarm flies on."""
+    """Show a running swarm in a dashboard; Ctrl-C closes it, and the swarm flies on."""
     from ftcc.groundside.dashboard import Dashboard, Subject, events_of, watched
     from ftcc.groundside.results import Run
     from ftcc.groundside.swarm import find_swarm
@@ -54,7 +56,11 @@ def watch(
     try:
         if dashboard.address:
             out.print(f"dashboard: {dashboard.address}", soft_wrap=True, highlight=False)
-        out.print(f"watching {entry.name}; Ctrl-C detaches", soft_wrap=True, highlight=False)
+        out.print(
+            f"watching {entry.name}; Ctrl-C closes the dashboard, and the swarm flies on",
+            soft_wrap=True,
+            highlight=False,
+        )
         with contextlib.suppress(KeyboardInterrupt):
             told: list[Event] | None = show_past(run, dashboard)
             for snapshot in watched(entry.name):
@@ -67,7 +73,7 @@ def watch(
                     dashboard.log(snapshot)
                 for problem in dashboard.take_problems():
                     warn(problem.text)
-            out.print(f"{entry.name} has landed; Ctrl-C closes the dashboard", soft_wrap=True, highlight=False)
+            out.print(f"{entry.name} has ended; Ctrl-C closes the dashboard", soft_wrap=True, highlight=False)
             dashboard.wait()
     except OSError as error:
         fail(f"{entry.name} cannot be watched: {error.strerror or error}")
@@ -98,12 +104,14 @@ def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")],
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     viewer: _Viewer = "web",
     browser: _Browser = True,
-    draw: Annotated[bool, typer.Option("--draw", help="Draw the dashboard's recording anew from the signals.")] = False,
+    draw: Annotated[
+        bool, typer.Option("--draw", help="Draw the recording of the dashboard again, from the signals.")
+    ] = False,
 ) -> None:
-    """Show a recorded run in the dashboard; Ctrl-C ends it."""
+    """Show a recorded run in the dashboard; Ctrl-C closes it."""
     from ftcc.groundside.dashboard import Viewer
     from ftcc.groundside.dashboard import draw_run as draw_recording
     from ftcc.groundside.results import Run
@@ -113,7 +121,7 @@ def replay(
     out = terminal()
     file = recorded.path / "swarm.rrd"
     if draw or not file.is_file():
-        out.print("drawing what was recorded ...", highlight=False)
+        out.print("drawing the recorded flight ...", highlight=False)
         draw_recording(recorded, file)
     shown = Viewer(kind, None, browser, None, file.resolve())
     try:

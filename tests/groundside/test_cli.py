@@ -56,7 +56,7 @@ def test_help_lists_the_commands_by_section(
     assert {"fly", "watch"} <= set(sections["Flights"])
     assert sections["Results"] == ["report", "compare", "replay"]
     assert {"fault", "link", "pause"} <= set(sections["Commands to a running swarm"])
-    assert ("List schemes and shipped scenarios with their forms and variants." in out) == whole
+    assert ("List schemes and bundled scenarios, with their forms and variants." in out) == whole
 
 
 def test_check_names_every_case_that_it_checked(ftcc: Callable[..., Outcome]) -> None:

@@ -98,7 +98,7 @@ def test_version_tells_what_matters_for_people_and_for_machines(ftcc: Callable[.
     [
         (["--json"], "--version"),
         (["--version", "list"], "takes no command"),
-        (["--no-color"], "a command is missing"),
+        (["--no-color"], "no command given"),
     ],
 )
 def test_what_makes_no_sense_before_a_command_is_refused(
@@ -222,7 +222,7 @@ def test_failures_tells_what_the_aircraft_of_a_scenario_have(ftcc: Callable[...,
         code, out, _ = ftcc("failures", *arguments)
         assert code == 0
         assert f"102 SYSTEM_SERVO: {servos}\n" in out
-        assert "Which aircraft" not in out
+        assert "Actuators of each kind" not in out
     code, _, err = ftcc("failures", "--variant", "off")
     assert code == 2
     assert "need a scenario" in err

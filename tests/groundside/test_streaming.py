@@ -150,5 +150,5 @@ def test_a_disk_that_gets_full_ends_in_one_line_and_leaves_nothing_half_written(
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
-    assert "cannot be written: No space left on device; make room, or give --out" in capsys.readouterr().err
+    assert "cannot be written: No space left on device; free some space, or give --out" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

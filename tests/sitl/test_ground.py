@@ -304,7 +304,7 @@ def test_a_vehicle_that_has_died_is_missed(fly: Callable[..., Flight], ftcc: Ftc
     assert "UAV 3 of swarm run does not answer" in missed.stderr
     partly = ftcc("link", "cut", "2", "3")
     assert partly.returncode == 1
-    assert "not at both ends: UAV 3" in partly.stderr
+    assert "done at one end only: UAV 3" in partly.stderr
 
 
 def test_keys_are_made_once(ftcc: Ftcc, tmp_path: Path) -> None:
