@@ -59,6 +59,7 @@ NOT_RUN = {
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
     "ruff": "is a linter: .ci/run calls it",
     "mypy": "is a type checker: .ci/run calls it",
+    "python -m tests.typings": "is called by .ci/run: tests/test_packages.py",
     "docs/architecture.md drawing": "is no text to type",
     "docs/compiled.md drawing": "is no text to type",
     "docs/tick.md drawing": "is no text to type",
