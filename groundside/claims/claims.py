@@ -63,7 +63,7 @@ def tolerance_of(text: str) -> Tolerance:
     ValueError
     """
     found = _TOLERANCE.match(text)
-    problem = f'{text!r} is no tolerance; write "15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"'
+    problem = f'{text!r} is not a tolerance; write "15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"'
     if not found:
         raise ValueError(problem)
     try:

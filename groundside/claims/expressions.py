@@ -142,7 +142,7 @@ def _parsed(expression: str) -> ast.expr:
     try:
         return ast.parse(expression.strip(), mode="eval").body
     except SyntaxError as error:
-        raise ValueError(f"{expression!r} is no expression: {error.msg}") from None
+        raise ValueError(f"{expression!r} is not an expression: {error.msg}") from None
 
 
 @functools.cache
@@ -184,7 +184,7 @@ def _other(expression: str, node: ast.Subscript) -> tuple[str, int]:
     name, uav = node.value, node.slice
     if isinstance(name, ast.Name) and isinstance(uav, ast.Constant) and type(uav.value) is int:
         return name.id, uav.value
-    raise ValueError(f"{expression!r}: the z of UAV 4 is z[4]")
+    raise ValueError(f"{expression!r}: write z[4] for the z of UAV 4")
 
 
 def uavs_in(expression: str) -> set[int]:

@@ -104,7 +104,7 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> 
         keep(folder)
         held = [file for file in _HELD if (folder / file).exists()]
     except OSError as error:
-        instead = "; name a folder that can be with --out" if out is None else ""
+        instead = "; choose another folder with --out" if out is None else ""
         option = "" if out is None else "--out "
         raise RunError(f"{option}{folder}: cannot be written: {error.strerror or error}{instead}") from None
     if held:

@@ -48,7 +48,7 @@ class Run:
         self._used = 0
         """Bytes of them."""
         if not (self.path / "scenario.toml").is_file():
-            raise RunError(f"{self.path}: is no run's folder (there is no scenario.toml in it)")
+            raise RunError(f"{self.path}: is not the folder of a run (it contains no scenario.toml)")
 
     @functools.cached_property
     def scenario(self) -> Scenario:
@@ -182,7 +182,7 @@ class Run:
         except (pa.ArrowInvalid, pa.ArrowException, OSError) as error:
             what = str(error).splitlines()[0]
             raise RunError(
-                f"{self.path / 'signals.parquet'}: cannot be read ({what}); a run with parts/ is merged anew without it"
+                f"{self.path / 'signals.parquet'}: cannot be read ({what}); a run with parts/ merges again without it"
             ) from None
 
     @property

@@ -128,10 +128,10 @@ def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
         if not math.isclose(exchange, period):
             findings.refuse(
                 f"rates.exchange_rate = {rates.exchange_rate:g}: form {IDEAL} exchanges at every tick; "
-                f"leave it out, or fly form flight"
+                f"leave it out, or use form flight"
             )
         if rates.latency:
-            findings.refuse(f"rates.latency = {rates.latency:g}: form {IDEAL} has none; leave it out")
+            findings.refuse(f"rates.latency = {rates.latency:g}: form {IDEAL} has no latency; leave it out")
     every = rates.control_rate / plan.record_rate
     if not whole(every) or every < 1.0 - 1e-9:
         findings.refuse(
@@ -160,7 +160,7 @@ def _check_grid(rates: Rates, period: float, step: float, wire: bool, findings: 
             f"a period of {near / 1e3:g} ms"
         )
     elif period < least - _OFF_GRID:
-        why = ", or the ms stamps of MAVLink would not tell ticks apart" if wire else ""
+        why = ", because MAVLink stamps ticks in whole ms" if wire else ""
         findings.refuse(f"{where}must be at least {least / 1e3:g} ms{why}")
     if abs(step - round(step)) > _OFF_GRID:
         findings.refuse(f"rates.plant_step = {rates.plant_step:g}: must be whole microseconds")
@@ -193,7 +193,7 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
     known = followers + leaders
     twice = sorted({uav for uav in known if known.count(uav) > 1})
     if twice:
-        findings.refuse(f"uavs: {', '.join(map(str, twice))} stands there twice")
+        findings.refuse(f"uavs: UAV {', '.join(map(str, twice))} is listed twice")
     if set(plan.leaders) != set(leaders):
         findings.refuse(f"leaders: tables for UAVs {sorted(plan.leaders)}, but uavs.leaders = {sorted(leaders)}")
     weights: dict[tuple[int, int], float] = {}
@@ -203,7 +203,7 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
                 if uav not in known:
                     findings.refuse(f"graph.edges.{n}: there is no UAV {uav}; UAVs are {', '.join(map(str, known))}")
             if (receiver, sender) in weights:
-                findings.refuse(f"graph.edges.{n}: edge {sender} -> {receiver} stands there twice")
+                findings.refuse(f"graph.edges.{n}: edge {sender} -> {receiver} is listed twice")
             weights[receiver, sender] = edge.weight
     known_to_graph = {pair: weight for pair, weight in weights.items() if set(pair) <= set(known)}
     findings.stop_if_refused()
@@ -222,21 +222,23 @@ def _warn_of_edges(graph: Graph, findings: Findings) -> None:
     """Say which edges and leaders are without effect."""
     for (receiver, sender), weight in graph.weights.items():
         if receiver in graph.leaders and sender in graph.followers:
-            findings.warned.append(f"graph.edges: {sender} -> {receiver} is without effect: leaders hear no followers")
+            findings.warned.append(
+                f"graph.edges: {sender} -> {receiver} has no effect: leaders do not receive from followers"
+            )
         elif weight < _NEGLIGIBLE * max(graph.weights.values()):
             findings.warned.append(
-                f"graph.edges: {sender} -> {receiver} has weight {weight:g}: as good as none beside the others"
+                f"graph.edges: {sender} -> {receiver} has weight {weight:g}, which is negligible beside the others"
             )
     for leader in graph.leaders:
         if not graph.receivers(leader):
-            findings.warned.append(f"graph.edges: nobody hears leader {leader}")
+            findings.warned.append(f"graph.edges: no UAV receives from leader {leader}")
 
 
 def require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Findings) -> None:
     for uav in uavs:
         if uav not in plan.uavs.followers:
             findings.refuse(
-                f"{where}: UAV {uav} is no follower; followers are {', '.join(map(str, plan.uavs.followers))}"
+                f"{where}: UAV {uav} is not a follower; followers are {', '.join(map(str, plan.uavs.followers))}"
             )
 
 
@@ -288,7 +290,7 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
         # Of pitch angle and angle of attack either may be the one that is measured.
         instead = name == "alpha" and deviations["theta"] == 0.0
         if deviations[name] > 0.0 and not instead:
-            findings.refuse(f"noise.{name}: follows from the other channels as measured; give those")
+            findings.refuse(f"noise.{name}: is computed from other measured channels; give their noise instead")
     channels = [name for name, _ in plant.DISTURBANCES]
     for n, disturbance in enumerate(plan.disturbances):
         for name in disturbance.values:

@@ -54,7 +54,7 @@ def check_ends(plan: Plan, findings: Findings) -> None:
             if fault.at <= other.at < fault.until:
                 findings.refuse(
                     f"faults.{m}.at = {other.at:g}: faults.{n} of the same part of UAV {fault.uav} lasts from "
-                    f"{fault.at:g} to {fault.until:g} s; begin after it, or leave its until out"
+                    f"{fault.at:g} to {fault.until:g} s; begin after it, or leave out its until"
                 )
 
 
@@ -144,5 +144,5 @@ def check_faults(
             if fault.without_trim:
                 findings.warned.append(text)
             else:
-                findings.refuse(f"{text} (without_trim = true flies it all the same)")
+                findings.refuse(f"{text} (without_trim = true flies it anyway)")
             break

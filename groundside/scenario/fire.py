@@ -60,9 +60,7 @@ def posts(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int,
         findings.refuse(f"fire.posts.{uav}: " + ("is missing" if uav in followers else f"there is no UAV {uav}"))
     changes = [command.at for command in fire_commands(plan)]
     if changes != sorted(changes) or len({event.at for event in plan.fire_events}) < len(plan.fire_events):
-        findings.refuse(
-            "fire_events: must stand in the order of time, one at a time, each after the until of those before"
-        )
+        findings.refuse("fire_events: must be in order of time, one at a time, each after the until of those before")
     for n, event in enumerate(plan.fire_events):
         if event.drift is not None and max(map(abs, event.drift)) >= fire.shift_speed:
             findings.refuse(
@@ -181,7 +179,7 @@ def check_posts(
         slowest = float(needed.speed.min())
         if slowest <= vehicle.guards.least_airspeed:
             refuse(
-                f"fire.posts.{vehicle.uav}: demands a speed of {slowest:.1f} m/s; must exceed the least airspeed, "
+                f"fire.posts.{vehicle.uav}: demands a speed of {slowest:.1f} m/s; must exceed the lowest airspeed, "
                 f"{vehicle.guards.least_airspeed:g} m/s"
             )
         for actuator, demanded in needed.inputs.items():
@@ -224,7 +222,7 @@ def _check_start(vehicle: VehicleSpec, needed: _Needed, findings: Findings) -> N
     away = float(np.linalg.norm(true[:3] - needed.motion[0, :3]))
     if away > _FAR:
         findings.warned.append(
-            f"start of UAV {vehicle.uav}: {away:.0f} m from its post; starts up to {_FAR:g} m away have been flown"
+            f"start of UAV {vehicle.uav}: {away:.0f} m from its post; starts up to {_FAR:g} m away were tested"
         )
     ground = true[V] * math.cos(true[GAMMA])
     own = np.array([ground * math.cos(true[CHI]), ground * math.sin(true[CHI]), true[V] * math.sin(true[GAMMA])])

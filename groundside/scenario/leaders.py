@@ -56,9 +56,7 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
     if fields.over_obstacles:
         triggers = _reaction(plan, uav)
     if commands != sorted(commands, key=lambda c: c.at):
-        findings.refuse(
-            f"leaders.{uav}.commands: must stand in the order of time, each after the until of those before"
-        )
+        findings.refuse(f"leaders.{uav}.commands: must be in order of time, each after the until of those before")
     profile = Profile(
         x=fields.x,
         z=fields.z,
@@ -133,7 +131,7 @@ def _limit(
         return stated
     limit = min(_OF_THRUST * thrust, _OF_ESTIMATES * estimates)
     if flown > limit:
-        findings.warned.append(f"{told}: it is held at {limit:.2f} m/s ({way}_limit would say otherwise)")
+        findings.warned.append(f"{told}: it is held at {limit:.2f} m/s ({way}_limit changes this)")
     return limit
 
 
@@ -160,11 +158,11 @@ def _check_reactions(plan: Plan, findings: Findings) -> None:
         if given != len(plan.obstacles):
             findings.refuse(f"leaders.{uav}.over_obstacles: {given} altitudes for {len(plan.obstacles)} obstacles")
         if any(command.x is not None for command in plan.leaders[uav].commands):
-            findings.refuse(f"leaders.{uav}: takes either over_obstacles or commands by position")
+            findings.refuse(f"leaders.{uav}: give either over_obstacles or commands by position, not both")
     if reacting and plan.detection_range is None:
-        findings.refuse("detection_range: is missing; the leaders climb over obstacles that they detect")
+        findings.refuse("detection_range: is missing; leaders need it to detect the obstacles that they climb over")
     if reacting and len({leader.V for leader in plan.leaders.values()}) > 1:
-        findings.refuse("leaders: those that climb over obstacles together must fly at one speed")
+        findings.refuse("leaders: all that climb over obstacles must fly at the same speed")
 
 
 def _reaction(plan: Plan, uav: int) -> list[Trigger]:

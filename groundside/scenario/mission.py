@@ -223,7 +223,7 @@ def _check_that_it_can_be_flown(
         laws = {uav: basis.scheme.command_limits(own) for uav, own in gains.items()}
         check_posts(plan, references, vehicles, laws, model, findings)
     if not basis.wire and any(fault.navigation for fault in plan.faults):
-        findings.refuse(f"faults: form {IDEAL} measures without a navigation solution that could fail")
+        findings.refuse(f"faults: form {IDEAL} has no navigation solution that could fail")
 
 
 def _guided(

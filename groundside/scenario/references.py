@@ -27,9 +27,9 @@ def own_references(
         if kind == plant and not given:
             findings.refuse(f"{table}: is missing")
         if kind != plant and given:
-            findings.refuse(f"{table}: the scheme flies by [{_TABLES[plant]}]")
+            findings.refuse(f"{table}: this scheme follows [{_TABLES[plant]}]")
     if plan.leaders and plant != "longitudinal":
-        findings.refuse(f"leaders: the scheme has none; each UAV flies by [{_TABLES[plant]}]")
+        findings.refuse(f"leaders: this scheme has none; each UAV follows [{_TABLES[plant]}]")
     findings.stop_if_refused()
     if plant == "longitudinal":
         assert plan.mission is not None
@@ -50,11 +50,13 @@ def _attitude(plan: Plan, uav: int, timing: Timing, findings: Findings) -> OwnRe
             continue
         if given.at < command.at:
             findings.refuse(
-                f"attitude.commands.{n}.at = {given.at:g}: must stand in the order of time, each after the until of "
+                f"attitude.commands.{n}.at = {given.at:g}: must be in order of time, each after the until of "
                 f"those before"
             )
         if given.until is not None and not commands:
-            findings.refuse(f"attitude.commands.{n}.until: the first command of UAV {uav} has none before it")
+            findings.refuse(
+                f"attitude.commands.{n}.until: the first command of UAV {uav} cannot end: there is none before it"
+            )
         before = command
         asked = {"mu": given.bank, "alpha": given.alpha, "beta": given.sideslip}
         command = command._replace(at=given.at, **{axis: value for axis, value in asked.items() if value is not None})
@@ -63,7 +65,7 @@ def _attitude(plan: Plan, uav: int, timing: Timing, findings: Findings) -> OwnRe
             command = before._replace(at=given.until)
             commands.append(command)
     if not commands or commands[0].at > 0.0:
-        findings.refuse(f"attitude.commands: UAV {uav} has no command at = 0, at which its reference starts")
+        findings.refuse(f"attitude.commands: UAV {uav} needs a command with at = 0, where its reference starts")
         commands.insert(0, command._replace(at=0.0))
     start = commands[sum(one.at <= 0.0 for one in commands) - 1]
     return OwnReference(

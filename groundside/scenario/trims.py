@@ -116,7 +116,7 @@ def check_trims(
         if text:
             without.setdefault(text, []).append(vehicle.uav)
     for text, uavs in without.items():
-        tell(f"UAV {', '.join(map(str, uavs))}: {text} (plant.beyond_limits = true flies it all the same)")
+        tell(f"UAV {', '.join(map(str, uavs))}: {text} (plant.beyond_limits = true flies it anyway)")
 
 
 def _beyond_travel(

@@ -27,7 +27,7 @@ def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
     for where, uavs in named:
         for uav in {*(uavs or ())} - {*plan.uavs.followers}:
             followers = ", ".join(map(str, plan.uavs.followers))
-            findings.refuse(f"{where}: UAV {uav} is no follower; followers are {followers}")
+            findings.refuse(f"{where}: UAV {uav} is not a follower; followers are {followers}")
 
 
 def mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:

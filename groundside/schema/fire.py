@@ -57,6 +57,6 @@ class FireEventFields(Strict):
         if self.centre is None and self.drift is None:
             raise ValueError("needs some of centre, drift")
         if self.until is not None and self.drift is None:
-            raise ValueError("until goes with drift; a centre stays where it has come to")
+            raise ValueError("until needs drift; a centre stays where it is")
         check_end(self.at, self.until)
         return self

@@ -37,7 +37,7 @@ class CommandFields(Strict):
             raise ValueError("needs either at = seconds, or x = position (and uav = the leader that passes it)")
         if self.until is not None:
             if self.at is None:
-                raise ValueError("until goes with at; a command by position stands until the next one")
+                raise ValueError("until needs at; a command by position holds until the next one")
             check_end(self.at, self.until)
         return self
 

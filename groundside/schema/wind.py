@@ -44,7 +44,7 @@ class GustFields(Strict):
         if self.along == self.right == self.up == 0.0:
             raise ValueError("needs some of along, right, up")
         if self.until is not None and not self.held:
-            raise ValueError("until goes with a gust that is held")
+            raise ValueError("until needs a gust that is held")
         return self
 
 

@@ -49,7 +49,7 @@ class DisturbanceFields(Strict):
     def _consistent(self) -> Self:
         check_end(self.at, self.until)
         if self.frequency is None and "phase" in self.model_fields_set:
-            raise ValueError("phase goes with frequency, of an oscillation")
+            raise ValueError("phase needs frequency, which makes an oscillation")
         return self
 
     @property

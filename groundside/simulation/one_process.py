@@ -181,7 +181,7 @@ def _require(mission: Mission, needed: float, free: float, of: str) -> None:
         what = f"{_size(mission)[0]} rows of {len(mission.uavs)} UAVs"
         raise TooLargeError(
             f"duration = {mission.timing.duration:g}: {what} take {needed:.1f} GB of {of}, {free:.1f} GB are free; "
-            "fly shorter, or lower record_rate"
+            "shorten the flight, or lower record_rate"
         )
 
 

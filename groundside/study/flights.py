@@ -131,7 +131,7 @@ def _semaphores() -> Any:
         return multiprocessing.get_context("spawn").Event()
     except (OSError, ImportError) as error:
         why = getattr(error, "strerror", None) or error
-        text = f"no semaphores for several processes ({why}; they lie in /dev/shm): all flights fly in this one"
+        text = f"cannot use several processes ({why}; their semaphores need /dev/shm): all flights run in this one"
         warnings.warn(text, RuntimeWarning, stacklevel=3)
         return None
 

@@ -175,7 +175,7 @@ def _variation(text: str) -> Variation:
     if "" in values:
         raise StudyError(f"--vary {text}: a value is missing between two commas")
     if any(values.count(value) > 1 for value in values):
-        raise StudyError(f"--vary {text}: a value stands there twice")
+        raise StudyError(f"--vary {text}: a value is listed twice")
     return Variation(key, tuple(values))
 
 

@@ -158,7 +158,7 @@ class Conversation:
         after = _value(self._ask(uav, [message], answers, f"parameter {name}"))
         if not same(after):
             why = self._reason(uav)
-            raise RefusedError(f"UAV {uav}: {name} = {value:.10g} is refused: {why}; in force is {after:.10g}")
+            raise RefusedError(f"UAV {uav}: {name} = {value:.10g} is refused: {why}; the present value is {after:.10g}")
         return after
 
     def parameters(self, uav: int) -> dict[str, float]:
@@ -175,7 +175,7 @@ class Conversation:
                         found[message.param_index] = (message.param_id, _value(message))
             if len(found) == count:
                 return dict(found[n] for n in sorted(found))
-        raise NoAnswerError(f"UAV {uav} has told {len(found)} of its parameters and no more")
+        raise NoAnswerError(f"UAV {uav} sent only {len(found)} of its parameters")
 
     def _read(self, uav: int, name: str) -> tuple[float, int]:
         """Value and type of a parameter."""

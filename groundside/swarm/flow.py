@@ -110,7 +110,9 @@ class Flow:
             If it is none that the swarm's clock can keep.
         """
         if math.isinf(speed) and not self.lockstep:
-            raise FlowError("a swarm on the wall clock has a speed; as fast as possible flies a swarm in lockstep")
+            raise FlowError(
+                "a swarm on the wall clock needs a speed; only a swarm in lockstep can fly as fast as possible"
+            )
         self.speed = speed
         if self.state != "flying":
             return

@@ -55,7 +55,7 @@ class FlightInProgress:
         fine = not self.log.trouble
         self.log.write(event.t, event.text, event.uav, event.severity, **more)
         if fine and self.log.trouble:
-            self.note(Event(event.t, "error", f"events are not logged any further: {self.log.trouble}"))
+            self.note(Event(event.t, "error", f"events are no longer logged: {self.log.trouble}"))
 
     def scheduled_events(self) -> None:
         """Note the scenario's own events as their time comes."""
@@ -108,9 +108,7 @@ class FlightInProgress:
             # What has been recorded cannot be read, or is nothing: the log says why.
             return
         except OSError as error:
-            what = (
-                f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` does it once there is room"
-            )
+            what = f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` merges them once there is space"
             self.note(Event(-1.0, "error", f"the processes' recordings are {what}"))
             return
         self.swarm.outcome.verdict = verdict

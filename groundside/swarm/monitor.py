@@ -112,7 +112,7 @@ class Monitor:
 
     def _end_log(self, error: OSError) -> None:
         self._log = None
-        self._trouble = f"the telemetry is not logged any further: {error.strerror or error}"
+        self._trouble = f"telemetry is no longer logged: {error.strerror or error}"
 
     def take_trouble(self) -> str:
         """Why the log has ended before its time, once; else empty."""

@@ -116,7 +116,7 @@ class Station(Conversation):
         NoAnswerError, RefusedError
         """
         if what not in _ON_BOARD:
-            raise StationError(f"{what}: nothing of that name can fail; there are {', '.join(_ON_BOARD)}")
+            raise StationError(f"{what}: is not a part that can fail; there are {', '.join(_ON_BOARD)}")
         unit, instance = _ON_BOARD[what]
         return self.inject(uav, unit, kind, instance, at=at, **sizes)
 
@@ -174,7 +174,7 @@ class Station(Conversation):
             "slow": {n: v for n, v in sizes.items() if n == "jitter"},
         }
         if not any(kinds.values()):
-            raise StationError("degrade: say by how much: loss, burst_s, burst_e, burst_l, delay or jitter")
+            raise StationError("degrade: give at least one of loss, burst_s, burst_e, burst_l, delay or jitter")
 
         def degrade(uav: int, sender: int) -> None:
             for kind, given in kinds.items():
@@ -233,7 +233,7 @@ class Station(Conversation):
         """Set the mode: "mission", "hold" or "offboard"."""
         code = code_of(mode)
         if code is None:
-            raise StationError(f"mode {mode}: there are mission, hold and offboard")
+            raise StationError(f"mode {mode}: must be mission, hold or offboard")
         flags = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | dialect.MAV_MODE_FLAG_SAFETY_ARMED
         self.command(uav, dialect.MAV_CMD_DO_SET_MODE, flags, code >> 16 & 0xFF, code >> 24)
 

@@ -172,20 +172,20 @@ def test_turbulence_is_that_of_the_seed_and_of_the_uav() -> None:
             "faults=[{at=5.0, until=9.0, uav=1, actuator='elevator'}, {at=7.0, uav=1, actuator='elevator'}]",
             "faults.1.at = 7: faults.0 of the same part of UAV 1 lasts from 5 to 9 s",
         ),
-        ("leaders.7.commands=[{x=100.0, until=9.0, altitude=1010.0}]", "until goes with at"),
+        ("leaders.7.commands=[{x=100.0, until=9.0, altitude=1010.0}]", "until needs at"),
         (
             "leaders.7.commands=[{at=5.0, until=9.0, altitude=1010.0}, {at=7.0, speed=31.0}]",
             "each after the until of those before",
         ),
         ("gusts=[{at=5.0, length=60.0}]", "needs some of along, right, up"),
         ("gusts=[{at=5.0, until=6.0, up=1.0, length=60.0}]", "gusts.0.until = 6: it rises until"),
-        ("gusts=[{at=5.0, until=9.0, up=1.0, length=60.0, held=false}]", "until goes with a gust that is held"),
-        ("gusts=[{at=5.0, up=1.0, length=60.0, uavs=[7]}]", "gusts.0.uavs: UAV 7 is no follower"),
+        ("gusts=[{at=5.0, until=9.0, up=1.0, length=60.0, held=false}]", "until needs a gust that is held"),
+        ("gusts=[{at=5.0, up=1.0, length=60.0, uavs=[7]}]", "gusts.0.uavs: UAV 7 is not a follower"),
         ("turbulence={sigma=[1.0, 1.0, 1.0]}", "needs either sigma and length, or wind_20ft and altitude"),
         ("turbulence={wind_20ft=8.0, altitude=1000.0}", "turbulence.altitude = 1000.0: must be less than"),
         (
             "turbulence={sigma=[1.0, 1.0, 1.0], length=[9.0, 9.0, 9.0], uavs=[8]}",
-            "turbulence.uavs: UAV 8 is no follower",
+            "turbulence.uavs: UAV 8 is not a follower",
         ),
     ],
 )
@@ -196,13 +196,13 @@ def test_events_that_cannot_be_are_refused(setting: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("scenario", "setting", "said"),
     [
-        ("fire_monitoring", "fire_events=[{at=5.0, until=9.0, centre=[10.0, 0.0]}]", "until goes with drift"),
+        ("fire_monitoring", "fire_events=[{at=5.0, until=9.0, centre=[10.0, 0.0]}]", "until needs drift"),
         (
             "fire_monitoring",
             "fire_events=[{at=5.0, until=9.0, drift=[1.0, 0.0]}, {at=8.0, drift=[0.0, 0.0]}]",
             "each after the until of those before",
         ),
-        ("attitude_synchronization", "attitude.commands=[{at=0.0, until=5.0, bank=0.1}]", "has none before it"),
+        ("attitude_synchronization", "attitude.commands=[{at=0.0, until=5.0, bank=0.1}]", "there is none before it"),
         (
             "attitude_synchronization",
             "attitude.commands=[{at=0.0, bank=0.1}, {at=3.0, until=5.0, bank=0.2}, {at=4.0, alpha=0.1}]",

@@ -79,5 +79,5 @@ def test_a_present_folder_that_cannot_be_written_says_what_to_give(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs").write_text("a file")
-    with pytest.raises(RunError, match=r"^runs: cannot be written: .*; name a folder that can be with --out"):
+    with pytest.raises(RunError, match=r"^runs: cannot be written: .*; choose another folder with --out"):
         new_folder("demo")

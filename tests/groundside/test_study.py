@@ -75,7 +75,7 @@ def flown(scenario: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any
         (["nonsense"], "--vary nonsense: must be key.path=value"),
         (["channel.loss="], "--vary channel.loss=: must be key.path=value"),
         (["channel.loss=0,,0.3"], "a value is missing between two commas"),
-        (["channel.loss=0.1,.1"], "a value stands there twice"),
+        (["channel.loss=0.1,.1"], "a value is listed twice"),
         (["channel.loss=0", "channel.loss=0.3"], "--vary channel.loss: is varied twice"),
         (["seed=1,2"], "use --seeds"),
         (["channel.los=0,0.3"], "channel.los = 0: there is no such field here; allowed are loss"),
