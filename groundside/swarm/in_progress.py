@@ -108,8 +108,8 @@ class FlightInProgress:
             # What has been recorded cannot be read, or is nothing: the log says why.
             return
         except OSError as error:
-            what = f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` merges them once there is space"
-            self.note(Event(-1.0, "error", f"the processes' recordings are {what}"))
+            what = f"not merged into signals.parquet: {error.strerror or error}"
+            self.note(Event(-1.0, "error", f"recordings are {what}; `ftcc report` merges them once there is space"))
             return
         self.swarm.outcome.verdict = verdict
         try:

@@ -14,7 +14,7 @@ from typing import Any
 
 from ftcc.airside.gcs import LINK_FIELDS
 from ftcc.groundside.dashboard import Event, LinkState, Snapshot, UavState
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, TelemetryMessage
 from ftcc.link.flight_modes import NAMES as MODES
 from ftcc.link.flight_modes import mode_of
 from ftcc.sim.plant import TRUTH
@@ -119,7 +119,7 @@ class Monitor:
         trouble, self._trouble = self._trouble, ""
         return trouble
 
-    def _take(self, heard: _Heard, told: Told) -> None:
+    def _take(self, heard: _Heard, told: TelemetryMessage) -> None:
         if told.kind == ARRAY:
             if told.name == "truth":
                 heard.t = told.stamp_us / 1e6

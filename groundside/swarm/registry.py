@@ -72,7 +72,7 @@ def check_name(name: str) -> None:
     room = _LONGEST_PATH - len(os.fsencode(runtime_folder())) - len("/.feed")
     if len(os.fsencode(name)) > room:
         raise UserError(
-            f"a swarm called {name!r} is listed in {runtime_folder()}: its name may have at most at most {room} bytes"
+            f"a swarm called {name!r} is listed in {runtime_folder()}: its name may have at most {room} bytes"
         )
     if any(entry.name == name for entry in running_swarms()):
         raise UserError(f"a swarm called {name!r} is running; give another folder with --out")

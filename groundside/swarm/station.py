@@ -116,7 +116,7 @@ class Station(Conversation):
         NoAnswerError, RefusedError
         """
         if what not in _ON_BOARD:
-            raise StationError(f"{what}: is not a part that can fail; there are {', '.join(_ON_BOARD)}")
+            raise StationError(f"{what}: cannot fail; parts that can fail are {', '.join(_ON_BOARD)}")
         unit, instance = _ON_BOARD[what]
         return self.inject(uav, unit, kind, instance, at=at, **sizes)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.mavlink import LOOPBACK, STATION
 
-__all__ = ["ARRAY", "HEARTBEAT", "Ear", "Told"]
+__all__ = ["ARRAY", "HEARTBEAT", "Ear", "TelemetryMessage"]
 
 HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
 ARRAY = dialect.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY
@@ -30,7 +30,7 @@ _BUFFER = 4 << 20
 """Room for what arrives while the station is busy, bytes; the kernel may grant less and drops what does not fit."""
 
 
-class Told(NamedTuple):
+class TelemetryMessage(NamedTuple):
     """A message of a UAV."""
 
     system: int
@@ -42,7 +42,7 @@ class Told(NamedTuple):
     name: str = ""
     """Of a DEBUG_FLOAT_ARRAY."""
     stamp_us: int = 0
-    """Its simulated time; 0 where it tells none."""
+    """Its simulated time; 0 if it has none."""
     values: tuple[float, ...] = ()
     """Its numbers; the custom mode of a HEARTBEAT. Nothing of other messages."""
 
@@ -74,7 +74,7 @@ class Ear:
         """Free the port."""
         self._socket.close()
 
-    def hear(self) -> Iterator[list[Told]]:
+    def hear(self) -> Iterator[list[TelemetryMessage]]:
         """What has arrived, a list a datagram; bad data and values that are not finite are dropped."""
         for _ in range(_DATAGRAMS_PER_READ):
             try:
@@ -86,26 +86,26 @@ class Ear:
             else:
                 self.strangers += 1
 
-    def read(self, datagram: bytes) -> list[Told]:
+    def read(self, datagram: bytes) -> list[TelemetryMessage]:
         """The messages of a datagram, in order."""
         told = _read(datagram)
         if told is None:
-            told = [_told(message) for message in self._codec.parse(datagram)]
+            told = [_message_of(message) for message in self._codec.parse(datagram)]
         return told
 
 
-def _told(message: Any) -> Told:
+def _message_of(message: Any) -> TelemetryMessage:
     """What pymavlink has read."""
     system, kind, frame = message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf())
     if kind == HEARTBEAT:
-        return Told(system, kind, frame, values=(message.custom_mode,))
+        return TelemetryMessage(system, kind, frame, values=(message.custom_mode,))
     stamp = getattr(message, "time_usec", 1000 * getattr(message, "time_boot_ms", 0))
     if kind == ARRAY:
-        return Told(system, kind, frame, message.name, stamp, tuple(message.data))
-    return Told(system, kind, frame, stamp_us=stamp)
+        return TelemetryMessage(system, kind, frame, message.name, stamp, tuple(message.data))
+    return TelemetryMessage(system, kind, frame, stamp_us=stamp)
 
 
-def _read(datagram: bytes) -> list[Told] | None:
+def _read(datagram: bytes) -> list[TelemetryMessage] | None:
     """The messages of a datagram; None if it is not made of perfect frames of the `_KNOWN` ones alone."""
     told = []
     at, end = 0, len(datagram)
@@ -138,11 +138,11 @@ class _Known(NamedTuple):
     """Bytes of its payload."""
     seed: bytes
     """What its checksum ends with (CRC_EXTRA)."""
-    read: Callable[[int, int, bytes, bytes], Told | None]
+    read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]
     """Of system, kind, frame and whole payload; None where a value is not finite."""
 
 
-def _known(message: Any, read: Callable[[int, int, bytes, bytes], Told | None]) -> tuple[int, _Known]:
+def _known(message: Any, read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]) -> tuple[int, _Known]:
     return message.id, _Known(message.id, message.unpacker.size, bytes([message.crc_extra]), read)
 
 
@@ -153,38 +153,40 @@ _HUD = struct.Struct("<4f")
 _ARRAY = struct.Struct("<QH10s58f")
 
 
-def _heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> Told:
-    return Told(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
+def _heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
+    return TelemetryMessage(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
 
 
-def _state(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
+def _state(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
     stamp, *values = _STATE.unpack(payload)
-    return Told(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
+    return TelemetryMessage(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
 
 
-def _hud(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
-    return Told(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
+def _hud(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
+    return TelemetryMessage(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
 
 
-def _unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> Told:
-    return Told(system, kind, frame)
+def _unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> TelemetryMessage:
+    return TelemetryMessage(system, kind, frame)
 
 
-def _with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], Told]:
+def _with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], TelemetryMessage]:
     """What reads whole numbers that begin with their time, of so many octets and us a unit."""
 
-    def read(system: int, kind: int, frame: bytes, payload: bytes) -> Told:
-        return Told(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
+    def read(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
+        return TelemetryMessage(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
 
     return read
 
 
-def _array(system: int, kind: int, frame: bytes, payload: bytes) -> Told | None:
+def _array(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
     stamp, _, name, *values = _ARRAY.unpack(payload)
     # The sum of float32 as float64 is finite if, and only if, all are.
     if not math.isfinite(sum(values)):
         return None
-    return Told(system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values))
+    return TelemetryMessage(
+        system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values)
+    )
 
 
 _KNOWN = dict(

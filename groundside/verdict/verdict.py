@@ -174,7 +174,7 @@ class Verdict:
     @property
     def largest(self) -> list[str]:
         """The tracking errors, a line each."""
-        return [_told(error) for error in self.tracking]
+        return [_as_text(error) for error in self.tracking]
 
     def as_json(self) -> dict[str, Any]:
         """For programs: the content of ``verdict.json``."""
@@ -202,7 +202,7 @@ def size(value: float | None, unit: str) -> str:
     return f"{value:.3g} {unit}".removesuffix(" -")
 
 
-def _told(error: TrackingError) -> str:
+def _as_text(error: TrackingError) -> str:
     end = "" if error.end is None else f", {size(error.end, error.unit)} in the end"
     largest = f"up to {size(error.largest, error.unit)}, UAV {error.uav} at {error.at:.1f} s"
     return f"{error.meaning} ({error.name}): {largest}{end}"

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from ftcc.groundside.dashboard.snapshot import LinkState
 from ftcc.groundside.swarm.monitor import Monitor
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, Told
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, TelemetryMessage
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.flight_modes import MISSION, custom_mode
 from ftcc.link.mavlink import float_array
@@ -53,10 +53,10 @@ def station(pilot: socket.socket, tmp_path: Path) -> Iterator[Monitor]:
     made.close()
 
 
-def as_pymavlink_reads(datagram: bytes) -> list[Told]:
+def as_pymavlink_reads(datagram: bytes) -> list[TelemetryMessage]:
     told = []
     for message in Codec(254, 1).parse(datagram):
-        read = Told(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
+        read = TelemetryMessage(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
         if read.kind == HEARTBEAT:
             read = read._replace(values=(message.custom_mode,))
         if read.kind == ARRAY:
