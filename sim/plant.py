@@ -28,12 +28,12 @@ AIRSPEED, CLIMB, INCIDENCE, NUMBER, SIDESLIP = 1, 2, 3, 4, 6
 
 LOST = {
     0: "",
-    AIRSPEED: "airspeed left the model",
-    CLIMB: "flight-path angle left the model",
-    INCIDENCE: "angle of attack left the model",
+    AIRSPEED: "airspeed outside the model's valid range",
+    CLIMB: "flight-path angle outside the model's valid range",
+    INCIDENCE: "angle of attack outside the model's valid range",
     NUMBER: "state is not a number",
     DIVERGED: "control law gave a command that is not a number",
-    SIDESLIP: "sideslip left the model",
+    SIDESLIP: "sideslip outside the model's valid range",
 }
 """Why a vehicle ended, by code."""
 

@@ -83,7 +83,7 @@ def test_simulate_ends_with_1_if_an_aircraft_is_lost(ftcc: Callable[..., Outcome
     code, out, err = ftcc("simulate", "containment", "--duration", 40, "--out", tmp_path / "run", *settings)
     assert code == 1
     assert "no level trim" in err
-    assert "UAV 1 lost at 26.3 s: flight-path angle left the model" in out
+    assert "UAV 1 lost at 26.3 s: flight-path angle outside the model's valid range" in out
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,10 @@ from ftcc.groundside.scenario.mission import Mission
 from ftcc.groundside.simulation.one_process import TooLargeError, fly_in_memory, simulate
 
 MISSION_AT_500 = ["start.z=500", "leaders.7.z=500", "leaders.8.z=500", "leaders.7.commands.0.altitude=600"]
-GUARDED = "start of UAV 1: flight-path angle left the model: gamma = 1.5 rad, plant.guards.flight_path_angle = 1 rad"
+GUARDED = (
+    "start of UAV 1: flight-path angle outside the model's valid range: "
+    "gamma = 1.5 rad, plant.guards.flight_path_angle = 1 rad"
+)
 
 
 def mission(name: str, *settings: str, form: str = "flight", duration: float | None = None) -> Mission:

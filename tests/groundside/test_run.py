@@ -141,8 +141,8 @@ def test_the_rows_of_a_lost_uav_end_and_the_others_fly_on(tmp_path: Path) -> Non
     settings = ["faults.0.at=20", "faults.0.bias=0.6", "faults.0.without_trim=true"]
     run = simulate(resolve(load("containment", settings=settings, duration=60.0)), tmp_path / "lost")
     assert list(run.lost) == [1]
-    assert run.lost[1] == (pytest.approx(26.34), "flight-path angle left the model")
-    assert run.verdict.failures[0] == "UAV 1 lost at 26.3 s: flight-path angle left the model"
+    assert run.lost[1] == (pytest.approx(26.34), "flight-path angle outside the model's valid range")
+    assert run.verdict.failures[0] == "UAV 1 lost at 26.3 s: flight-path angle outside the model's valid range"
     end = run.column("t", 1)[-1]
     assert 20.0 < end < 60.0
     assert all(run.column("t", uav)[-1] == 60.0 for uav in range(2, 9))

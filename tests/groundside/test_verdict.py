@@ -142,16 +142,16 @@ def test_a_limit_cycle_is_named_and_what_the_leader_does_is_none() -> None:
 
 
 def test_lost_aircraft_are_named_with_their_cause() -> None:
-    found = verdict(lost={4: (61.5, "airspeed left the model")}, until={2: 70.0})
+    found = verdict(lost={4: (61.5, "airspeed outside the model's valid range")}, until={2: 70.0})
     assert found.word == FAILED
     assert found.failures == [
         "UAV 2 lost at 70.0 s: its recording ends",
-        "UAV 4 lost at 61.5 s: airspeed left the model",
+        "UAV 4 lost at 61.5 s: airspeed outside the model's valid range",
     ]
 
 
 def test_all_may_be_lost_and_nothing_be_recorded() -> None:
-    everybody = dict.fromkeys(CONTAINMENT.graph.followers, (50.0, "airspeed left the model"))
+    everybody = dict.fromkeys(CONTAINMENT.graph.followers, (50.0, "airspeed outside the model's valid range"))
     found = verdict(lost=everybody)
     assert len(found.failures) == 6
     assert found.tracking[0].end is None

@@ -35,7 +35,12 @@ def ends() -> Iterator[tuple[Connection, Gate]]:
 
 @pytest.mark.parametrize(
     "message",
-    [Ready(), Ended(400, 1, 400), Lost(3, 32_000_000, "airspeed left the model"), EventReport("warning", "waits", 2)],
+    [
+        Ready(),
+        Ended(400, 1, 400),
+        Lost(3, 32_000_000, "airspeed outside the model's valid range"),
+        EventReport("warning", "waits", 2),
+    ],
 )
 def test_what_a_process_says_arrives_at_the_launcher(ends, message):
     launcher, gate = ends

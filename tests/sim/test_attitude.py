@@ -270,10 +270,10 @@ def test_the_autothrottle_holds_the_airspeed_instead_of_the_commanded_thrust():
 @pytest.mark.parametrize(
     ("changes", "command", "reason"),
     [
-        ({"gamma": 1.2}, (0.0, -0.2, 0.0, 0.0), "airspeed left the model"),
-        ({"gamma": 1.4, "q": 0.6}, (0.0, -0.5, 0.0, 120.0), "flight-path angle left the model"),
-        ({"alpha": 1.2, "q": 30.0}, TRIM, "angle of attack left the model"),
-        ({"beta": 1.0, "r": -30.0}, TRIM, "sideslip left the model"),
+        ({"gamma": 1.2}, (0.0, -0.2, 0.0, 0.0), "airspeed outside the model's valid range"),
+        ({"gamma": 1.4, "q": 0.6}, (0.0, -0.5, 0.0, 120.0), "flight-path angle outside the model's valid range"),
+        ({"alpha": 1.2, "q": 30.0}, TRIM, "angle of attack outside the model's valid range"),
+        ({"beta": 1.0, "r": -30.0}, TRIM, "sideslip outside the model's valid range"),
         ({"p": math.nan}, TRIM, "state is not a number"),
         ({"V": 1e200}, TRIM, "state is not a number"),
     ],

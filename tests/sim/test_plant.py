@@ -309,9 +309,17 @@ def test_disturbances_add_up():
 @pytest.mark.parametrize(
     ("changes", "command", "reason"),
     [
-        ({"initial": (30.0, 0.0, 1000.0, 1.2, 1.23, 0.0)}, (0.0, -0.19688, 0.0, 0.0), "airspeed left the model"),
-        ({"initial": (30.0, 0.0, 1000.0, 1.45, 1.45, 0.6)}, (0.0, -0.7, 0.0, 40.0), "flight-path angle left the model"),
-        ({"initial": (30.0, 0.0, 1000.0, 0.0, 1.45, 40.0)}, TRIM, "angle of attack left the model"),
+        (
+            {"initial": (30.0, 0.0, 1000.0, 1.2, 1.23, 0.0)},
+            (0.0, -0.19688, 0.0, 0.0),
+            "airspeed outside the model's valid range",
+        ),
+        (
+            {"initial": (30.0, 0.0, 1000.0, 1.45, 1.45, 0.6)},
+            (0.0, -0.7, 0.0, 40.0),
+            "flight-path angle outside the model's valid range",
+        ),
+        ({"initial": (30.0, 0.0, 1000.0, 0.0, 1.45, 40.0)}, TRIM, "angle of attack outside the model's valid range"),
         ({"initial": (30.0, 0.0, 1000.0, math.nan, 0.0, 0.0)}, TRIM, "state is not a number"),
         ({"initial": (1e200, 0.0, 1000.0, 0.0, 0.03, 0.0)}, TRIM, "state is not a number"),
     ],

@@ -105,7 +105,7 @@ def test_a_point_that_stops_is_lost():
     fleet = build_fleet([point(initial=initial({"V": 3.2, "z": 100.0}, {}))])
     fleet.command[0] = (0.0, 1.0, 0.0, 0.0)
     fleet.airframe[0, Parameters._fields.index("CD0")] = 50.0
-    assert LOST[flown(fleet, 5.0)] == "airspeed left the model"
+    assert LOST[flown(fleet, 5.0)] == "airspeed outside the model's valid range"
 
 
 def test_a_second_order_actuator_follows_its_transfer_function():
