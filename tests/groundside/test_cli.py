@@ -191,7 +191,7 @@ def test_a_run_without_a_row_is_reported_as_far_as_it_goes(
         (("report", "nowhere"), ["nowhere", "no scenario.toml"]),
         (("report",), ["RUN"]),
         (("compare", "nowhere"), ["two runs"]),
-        (("compare", "nowhere", "elsewhere"), ["nowhere", "no run's folder"]),
+        (("compare", "nowhere", "elsewhere"), ["nowhere", "not the folder of a run"]),
         (("launch",), ["launch"]),
     ],
     ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else "",

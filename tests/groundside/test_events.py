@@ -164,7 +164,7 @@ def test_turbulence_is_that_of_the_seed_and_of_the_uav() -> None:
     ("setting", "said"),
     [
         ("disturbances=[{at=5.0, until=5.0, d1=0.1}]", "disturbances.0"),
-        ("disturbances=[{at=5.0, d1=0.1, phase=1.0}]", "phase goes with frequency"),
+        ("disturbances=[{at=5.0, d1=0.1, phase=1.0}]", "phase needs frequency"),
         ("disturbances=[{at=5.0, d1=0.1, frequency=-1.0}]", "disturbances.0.frequency = -1.0: must be greater than 0"),
         ("faults=[{at=5.0, until=4.0, uav=1, actuator='elevator'}]", "until = 4 must be later than at = 5"),
         ("faults=[{at=5.0, until=9.0, uav=1, actuator='elevator', kind='ok'}]", "kind = 'ok' takes no until"),
@@ -206,7 +206,7 @@ def test_events_that_cannot_be_are_refused(setting: str, said: str) -> None:
         (
             "attitude_synchronization",
             "attitude.commands=[{at=0.0, bank=0.1}, {at=3.0, until=5.0, bank=0.2}, {at=4.0, alpha=0.1}]",
-            "attitude.commands.2.at = 4: must stand in the order of time",
+            "attitude.commands.2.at = 4: must be in order of time",
         ),
     ],
 )

@@ -114,7 +114,7 @@ def test_a_fire_that_cannot_be_is_refused(setting, said):
         (["fire.omega=0.06"], "of thrust at t = "),
         (["fire.omega=0.0001"], "speed of"),
         (["fire_events=[{at = 9.0, drift = [5.0, 0.0]}]"], "must be below fire.shift_speed = 4 m/s"),
-        (["fire_events=[{at = 9.0, drift = [1.0, 0.0]}, {at = 8.0, drift = [0.0, 0.0]}]"], "in the order of time"),
+        (["fire_events=[{at = 9.0, drift = [1.0, 0.0]}, {at = 8.0, drift = [0.0, 0.0]}]"], "in order of time"),
         (["gains.a=1.0"], "gain a = 1: must be from 0 to 0.99"),
         (["gains.per_decade=20.0"], "more than 40 poles"),
         (["gains.k_eta=100.0"], "gain k_eta: its rate 100 1/s is unstable in Euler steps of 20 ms"),

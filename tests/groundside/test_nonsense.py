@@ -92,7 +92,7 @@ CHAIN = "graph.edges=[{from=1,to=2,weight=1},{from=2,to=3,weight=1},{from=3,to=4
         ("containment", ["plant.limits.elevator=[-0.1,0.1]", "faults=[]", "plant.beyond_limits=true"], "no level trim"),
         ("containment", ["graph.edges.0={from=1,to=7,weight=1}", "graph.edges.1={between=[1,2],weight=0.4}"], "1 -> 7"),
         ("directed_attitude", [CHAIN], "nothing that UAV 2 sends reaches UAV 1; sound all the same"),
-        ("directed_attitude", ["graph.edges.0.weight=1e-12"], "as good as none beside the others"),
+        ("directed_attitude", ["graph.edges.0.weight=1e-12"], "negligible beside the others"),
         ("attitude_synchronization", ["gains.eps_inf=0.01"], "phi / (k eps_inf) = 290.9 1/rad"),
         (
             "attitude_synchronization",

@@ -159,7 +159,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, kind: str) -> None:
         path.mkdir()
     elif kind == "file":
         path.write_text("no run")
-    with pytest.raises(RunError, match="is no run's folder"):
+    with pytest.raises(RunError, match="is not the folder of a run"):
         Run(path)
 
 

@@ -89,7 +89,10 @@ def test_malformed_toml_is_reported_with_its_line(tmp_path: Path) -> None:
         ({"settings": ["plant.model='glider'"]}, ["plant.model = 'glider'", "attitude, longitudinal"]),
         ({"settings": ["plant.coefficients={CLx=1.2}"]}, ["plant.coefficients: CLx", "CLa", "and all"]),
         ({"settings": ["start.mu=0.1"]}, ["start.mu: the plant has no such state", "theta"]),
-        ({"settings": ["noise.factor=1", "noise.alpha=0.1"]}, ["noise.alpha: follows from the other channels"]),
+        (
+            {"settings": ["noise.factor=1", "noise.alpha=0.1"]},
+            ["noise.alpha: is computed from other measured channels"],
+        ),
         (
             {"variants": ["sixdof"], "settings": ["start.alpha=0.1"]},
             ["start of UAV 1", "theta and alpha are both given"],
@@ -238,7 +241,7 @@ def _unheard_trigger(document: Document) -> None:
         (_unknown_metric, ["claims.0", "no metric 'biggest'", "max_abs"]),
         (_unknown_column, ["claims.0", "no column z_q", "z_r"]),
         (_no_arithmetic, ["claims.0", "functions are abs"]),
-        (_no_tolerance, ["claims.0", "'about right' is no tolerance", "15 %"]),
+        (_no_tolerance, ["claims.0", "'about right' is not a tolerance", "15 %"]),
         (_no_threshold, ["claims.0", "needs a threshold"]),
         (_claim_for_no_case, ["claims.0.expected", "'flihgt'", "flight"]),
         (_claims_of_no_case, ["variant.again.claims_of = 'flight+again'", "other variants"]),

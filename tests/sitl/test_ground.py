@@ -281,7 +281,7 @@ def test_with_a_key_whose_folder_takes_no_stamps_it_says_so_and_flies(
     stamps.rmdir()
     stamps.symlink_to("/proc/self")
     flight = held(fly, "--duration", "2", "--key", str(key))
-    assert "cannot be kept" in flight.output
+    assert "cannot be saved" in flight.output
     listed = ftcc("vehicles")
     assert listed.returncode == 0, listed.stderr
     assert listed.stdout.count("mission") == 8
