@@ -1,6 +1,7 @@
 """``python docs/rooms.py`` draws who imports whom, wings and the rooms of groundside, from the sources as they are.
 
-It writes ``docs/pictures/rooms.svg`` and prints the table of imports. An arrow that follows from others is not drawn.
+It writes ``docs/pictures/rooms.svg`` and the table of imports in ``docs/architecture.md``. An arrow that follows from
+others is not drawn.
 """
 
 from __future__ import annotations
@@ -146,4 +147,7 @@ def rooms() -> dict[str, set[str]]:
 
 if __name__ == "__main__":
     (ROOT / "docs" / "pictures" / "rooms.svg").write_text(picture(rooms()), encoding="utf-8")
-    print(table(rooms()))
+    page = ROOT / "docs" / "architecture.md"
+    before, begin, rest = page.read_text(encoding="utf-8").partition("<!-- rooms -->")
+    _, end, after = rest.partition("<!-- /rooms -->")
+    page.write_text(f"{before}{begin}\n{table(rooms())}\n{end}{after}", encoding="utf-8")
