@@ -94,7 +94,7 @@ def find(name_or_path: str | Path) -> Path:
         return path
     names = ", ".join(shipped())
     if path.suffix == ".toml" or len(path.parts) > 1:
-        raise ScenarioError(path, [f"there is no such file; shipped scenarios are {names}"])
+        raise ScenarioError(path, [f"there is no such file; bundled scenarios are {names}"])
     raise ScenarioError(path, [f"there is no such scenario; there are {names}, or give the path of a TOML file"])
 
 

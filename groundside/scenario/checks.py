@@ -262,7 +262,7 @@ def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[
             )
         if fault.uav not in plan.uavs.followers:
             findings.refuse(
-                f"faults.{n}.uav = {fault.uav}: is no follower; "
+                f"faults.{n}.uav = {fault.uav}: is not a follower; "
                 f"followers are {', '.join(map(str, plan.uavs.followers))}"
             )
     for n, disturbance in enumerate(plan.disturbances):
