@@ -75,8 +75,8 @@ def main() -> None:
         mission = run.mission
         sheet = sheet_of(mission)
         few = sheet.model_copy(update={"figures": [figure for figure in sheet.figures if figure.name in FIGURES]})
-        happened = tuple(sorted({event[0] for event in mission.events}))
-        for drawn in draw_figures(few, [Flown(mission.case, run, mission, happened)], folder):
+        event_times = tuple(sorted({event[0] for event in mission.events}))
+        for drawn in draw_figures(few, [Flown(mission.case, run, mission, event_times)], folder):
             png = next(file for file in drawn.files if file.suffix == ".png")
             small(Image.open(png), PICTURES / f"{drawn.name}.png")
 

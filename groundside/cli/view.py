@@ -20,7 +20,7 @@ Kind = Literal["web", "native"]
 
 _PAST_RATE, _PAST_PICTURES = 2.0, 400
 """How finely a swarm's past is drawn: at most so many pictures a simulated second, and so many in all."""
-_PATIENCE = 20.0
+_LAG_TIMEOUT = 20.0
 """Longest wait for a viewer that is still starting, s."""
 
 _Viewer = Annotated[str, typer.Option("--viewer", help="Where to show it: web or native.")]
@@ -40,8 +40,8 @@ def watch(
     viewer: _Viewer = "web",
     browser: _Browser = True,
 ) -> None:
-    """Show a running swarm in a dashboard; Ctrl-C closes it, and the swarm flies on."""
-    from ftcc.groundside.dashboard import Dashboard, Subject, events_of, watched
+    """Show a running swarm, what it has flown and what it goes on to; Ctrl-C detaches, and the swarm flies on."""
+    from ftcc.groundside.dashboard import Dashboard, Subject, events_of, watch_swarm
     from ftcc.groundside.results import Run
     from ftcc.groundside.swarm import find_swarm
 
@@ -63,7 +63,7 @@ def watch(
         )
         with contextlib.suppress(KeyboardInterrupt):
             told: list[Event] | None = show_past(run, dashboard)
-            for snapshot in watched(entry.name):
+            for snapshot in watch_swarm(entry.name):
                 if told is not None:
                     # What was logged between the past and the first news.
                     missed = [e for e in events_of(Run(entry.folder)) if e not in told and e not in snapshot.events]
@@ -93,7 +93,7 @@ def show_past(run: Run, dashboard: Dashboard) -> list[Event]:
     try:
         rate = min(_PAST_RATE, _PAST_PICTURES / max(run.end, 1.0))
         for snapshot in snapshots_of(run, rate):
-            dashboard.log(snapshot, patience=_PATIENCE)
+            dashboard.log(snapshot, timeout=_LAG_TIMEOUT)
             told += snapshot.events
             if problems := dashboard.take_problems():
                 warn(problems[0].text)

@@ -1,6 +1,6 @@
 from .dashboard import Dashboard as Dashboard
 from .feed import Feed as Feed
-from .feed import watched as watched
+from .feed import watch_swarm as watch_swarm
 from .replay import draw_run as draw_run
 from .replay import events_of as events_of
 from .replay import snapshots_of as snapshots_of

@@ -10,7 +10,7 @@ from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
 from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.dashboard.table import Table, events
+from ftcc.groundside.dashboard.table import Table, event_entries
 from ftcc.groundside.dashboard.viewer import BLUEPRINT, Entry
 
 __all__ = ["Artists"]
@@ -22,7 +22,7 @@ class Artists:
     def __init__(self, subject: Subject, first: Snapshot) -> None:
         self._pace = PaceCurve() if first.pace is not None else None
         self._detail = Detail(subject)
-        self._detail.follow(first)
+        self._detail.update(first)
         self._scene = Scene(subject, first, self._detail)
         self._attitudes = Attitudes(subject, self._detail) if subject.family == "attitude" else None
         self._plots = Plots(subject, self._detail)
@@ -36,11 +36,11 @@ class Artists:
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """One instant, and what happened before it."""
-        new = self._detail.follow(snapshot)
+        new = self._detail.update(snapshot)
         entries = [*self._scene.draw(snapshot, new), *self._plots.draw(snapshot, new), *self._table.draw(snapshot)]
         if self._attitudes is not None:
             entries += self._attitudes.draw(snapshot, new)
-        return entries + self._draw_pace(snapshot) + events(snapshot.events)
+        return entries + self._draw_pace(snapshot) + event_entries(snapshot.events)
 
     def _draw_pace(self, snapshot: Snapshot) -> list[Entry]:
         """Times real time; its plot joins the layout when the first pace is told, for a recorded run tells none."""

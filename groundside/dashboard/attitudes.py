@@ -11,11 +11,11 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.labels import label
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import label
 from ftcc.groundside.palette import colors
 from ftcc.link.rotation import body_axes
 
@@ -54,10 +54,12 @@ class Attitudes:
             for i, uav in enumerate(self._uavs)
         }
         self._eye = 1.3 * max(rows * rise, 0.5 * columns * _SPACING) * np.array([0.0, -1.0, 0.3])
-        self._turns = {uav: _turn(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()}
+        self._turns = {
+            uav: _rotation_between(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()
+        }
         self._poses = Poses()
         self._labels: dict[int, str] = {}
-        self._ghosts: set[int] = set()
+        self._outlined: set[int] = set()
         """Who has an outline."""
         self._others: list[int] = []
         """Who was drawn as a stick last."""
@@ -108,17 +110,17 @@ class Attitudes:
             wanted = {name: state.signals.get(signal, math.nan) for name, signal in _REFERENCES.items()}
             if all(map(math.isfinite, wanted.values())):
                 pose = self._poses.of(slot, {**ahead, **wanted}, turn)
-                entries += self._ghost(uav)
+                entries += self._draw_outline(uav)
                 entries.append(Entry(f"/attitudes/reference/{uav}", snapshot.t, pose))
         return entries
 
-    def _ghost(self, uav: int) -> list[Entry]:
+    def _draw_outline(self, uav: int) -> list[Entry]:
         """The outline of a UAV that has a reference, when it is first told: before, it would have no place."""
-        if uav in self._ghosts:
+        if uav in self._outlined:
             return []
-        self._ghosts.add(uav)
-        ghost = rr.LineStrips3D(outline(1.0), colors=self._colors[uav], radii=rr.Radius.ui_points(0.8))
-        return [Entry(f"/attitudes/reference/{uav}", None, ghost)]
+        self._outlined.add(uav)
+        shape = rr.LineStrips3D(outline(1.0), colors=self._colors[uav], radii=rr.Radius.ui_points(0.8))
+        return [Entry(f"/attitudes/reference/{uav}", None, shape)]
 
     def _sticks(self, snapshot: Snapshot) -> list[Entry]:
         """All who are not drawn in full, in one call."""
@@ -138,7 +140,7 @@ class Attitudes:
         return [Entry("/attitudes/others", snapshot.t, drawn)]
 
 
-def _turn(before: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[float, float, float, float]:
+def _rotation_between(before: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[float, float, float, float]:
     """The shortest rotation from one direction to another, not its opposite, as a quaternion."""
     a, b = before / np.linalg.norm(before), after / np.linalg.norm(after)
     q = np.array([1.0 + a @ b, *np.cross(a, b)])

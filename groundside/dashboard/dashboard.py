@@ -80,8 +80,8 @@ class Dashboard:
             self._viewer = Viewer(viewer, ports, open_browser, self._to_viewer)
             self.address = self._viewer.address
 
-    def log(self, snapshot: Snapshot, patience: float = 0.0) -> None:
-        """Draw ``snapshot``; waits for a viewer that lags for ``patience`` (wall s) at most."""
+    def log(self, snapshot: Snapshot, timeout: float = 0.0) -> None:
+        """Draw ``snapshot``; waits for a viewer that lags for ``timeout`` (wall s) at most."""
         if self._recording is None and self._viewer is None:
             return
         self._t = snapshot.t
@@ -94,7 +94,7 @@ class Dashboard:
         entries += self._artists.draw(snapshot)
         entries += self._own_events()
         if self._viewer is not None:
-            self._viewer.show(entries, patience)
+            self._viewer.show(entries, timeout)
         if self._recording is not None:
             write(self._recording, entries)
 
@@ -129,13 +129,13 @@ class Dashboard:
 
     def _own_events(self) -> list[Entry]:
         """The dashboard's own trouble, for its event log."""
-        from ftcc.groundside.dashboard.table import events
+        from ftcc.groundside.dashboard.table import event_entries
 
         problem = self._viewer.take_problem() if self._viewer is not None else None
         if problem is None:
             return []
         self._problems.append(problem)
-        return events([Event(self._t, "warning", problem)])
+        return event_entries([Event(self._t, "warning", problem)])
 
     def _stream(self, hold: float) -> rr.RecordingStream:
         """A stream of this flight; all of them are one recording to Rerun."""

@@ -15,9 +15,9 @@ So the calls that make a picture do not grow with the swarm, only the arrays in 
 
 from __future__ import annotations
 
+from ftcc.groundside.dashboard.labels import in_trouble
 from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
-from ftcc.groundside.dashboard.words import in_trouble
 
 __all__ = ["FULL", "Detail"]
 
@@ -38,7 +38,7 @@ class Detail:
         """Whether there are others, who are drawn together."""
         self.shown: list[int] = uavs
         """Who is drawn in full, in the order in which they came into view."""
-        self.room = FULL if self.crowded else len(uavs)
+        self.capacity = FULL if self.crowded else len(uavs)
         """How many there may be."""
         if self.crowded:
             leaders = subject.leaders[:_LEADERS]
@@ -47,16 +47,16 @@ class Detail:
             self.shown = sorted([*(uav for i, uav in enumerate(followers) if i in spread), *leaders])
         self._others = set(uavs) - set(self.shown)
 
-    def follow(self, snapshot: Snapshot) -> list[int]:
+    def update(self, snapshot: Snapshot) -> list[int]:
         """Take UAVs into view that have got into trouble, as long as there is room; those that are new."""
         new: list[int] = []
-        if not self.crowded or len(self.shown) >= self.room:
+        if not self.crowded or len(self.shown) >= self.capacity:
             return new
         for uav, state in snapshot.uavs.items():
             if uav in self._others and in_trouble(state, snapshot):
                 new.append(uav)
                 self._others.remove(uav)
                 self.shown.append(uav)
-                if len(self.shown) >= self.room:
+                if len(self.shown) >= self.capacity:
                     break
         return new

@@ -17,7 +17,7 @@ from typing import Any
 from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot, UavState
 from ftcc.link.ports import runtime_folder
 
-__all__ = ["Feed", "decoded", "encoded", "feed_path", "watched"]
+__all__ = ["Feed", "decode", "encode", "feed_path", "watch_swarm"]
 
 
 def feed_path(name: str) -> Path:
@@ -25,14 +25,14 @@ def feed_path(name: str) -> Path:
     return runtime_folder() / f"{name}.feed"
 
 
-def encoded(snapshot: Snapshot) -> bytes:
+def encode(snapshot: Snapshot) -> bytes:
     """A snapshot as a line."""
-    # Its dataclasses are told by their fields, without the copies that `asdict` makes of everything in them.
+    # Its dataclasses are data by their fields, without the copies that `asdict` makes of everything in them.
     return json.dumps(snapshot, default=vars, separators=(",", ":")).encode() + b"\n"
 
 
-def decoded(line: bytes) -> Snapshot:
-    """The inverse of `encoded`.
+def decode(line: bytes) -> Snapshot:
+    """The inverse of `encode`.
 
     Raises
     ------
@@ -40,17 +40,17 @@ def decoded(line: bytes) -> Snapshot:
         If it is no snapshot.
     """
     try:
-        told = json.loads(line)
-        uavs = {int(uav): _state(state) for uav, state in told["uavs"].items()}
-        pace = Pace(**told["pace"]) if told.get("pace") else None
-        return Snapshot(float(told["t"]), uavs, tuple(Event(**event) for event in told["events"]), pace)
+        data = json.loads(line)
+        uavs = {int(uav): _state(state) for uav, state in data["uavs"].items()}
+        pace = Pace(**data["pace"]) if data.get("pace") else None
+        return Snapshot(float(data["t"]), uavs, tuple(Event(**event) for event in data["events"]), pace)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"no snapshot: {error!r}") from None
 
 
-def _state(told: Mapping[str, Any]) -> UavState:
-    links = {int(sender): LinkState(**link) for sender, link in told["links"].items()}
-    return UavState(**{field.name: told[field.name] for field in fields(UavState)} | {"links": links})
+def _state(data: Mapping[str, Any]) -> UavState:
+    links = {int(sender): LinkState(**link) for sender, link in data["links"].items()}
+    return UavState(**{field.name: data[field.name] for field in fields(UavState)} | {"links": links})
 
 
 @dataclass
@@ -86,10 +86,10 @@ class Feed:
                 if not self._keeps_up(watcher):
                     watcher.missed += snapshot.events
                 elif watcher.missed:
-                    told, watcher.missed = snapshot.after(watcher.missed), ()
-                    self._send(watcher, encoded(told))
+                    complete, watcher.missed = snapshot.after(watcher.missed), ()
+                    self._send(watcher, encode(complete))
                 else:
-                    line = encoded(snapshot) if line is None else line
+                    line = encode(snapshot) if line is None else line
                     self._send(watcher, line)
             except OSError:
                 watcher.link.close()
@@ -115,7 +115,7 @@ class Feed:
         self._path.unlink(missing_ok=True)
 
 
-def watched(name: str) -> Iterator[Snapshot]:
+def watch_swarm(name: str) -> Iterator[Snapshot]:
     """The snapshots of a running swarm from now on, until it ends.
 
     Raises
@@ -128,4 +128,4 @@ def watched(name: str) -> Iterator[Snapshot]:
         with link.makefile("rb") as lines, contextlib.suppress(ConnectionResetError):
             for line in lines:
                 if line.endswith(b"\n"):
-                    yield decoded(line)
+                    yield decode(line)

@@ -11,11 +11,11 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.labels import describe_silence
 from ftcc.groundside.dashboard.shapes import arrows
 from ftcc.groundside.dashboard.snapshot import LinkState, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import silent_since
 from ftcc.groundside.palette import CUT, FRESH, STALE, colors
 from ftcc.link.graph import Graph
 
@@ -25,17 +25,17 @@ _FRESH, _STALE, _CUT = range(3)
 _TINTS = np.array([FRESH, STALE, CUT], np.uint8)
 """What comes through an edge, the better the lower, and its colour."""
 _NOTES = 8
-"""Notes in the plan of a big swarm."""
-_ASIDE = 0.2
+"""Notes in the layout of a big swarm."""
+_NOTE_OFFSET = 0.2
 """Distance of a note from its arrow; the circle of followers has radius 1."""
 _LOSSY = 0.01
 """Share of lost records from which it is written at an edge."""
-_FORGET = 20.0
+_LOSS_MEMORY = 20.0
 """Memory of the loss that is written, in snapshots: it follows changes within seconds."""
 
 
 class Links:
-    """Draws the edges among the aircraft and in a plan of their own."""
+    """Draws the edges among the aircraft and in a layout of their own."""
 
     def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
@@ -46,11 +46,15 @@ class Links:
         self._edges = sorted((sender, receiver) for receiver, sender in graph.weights)
         index = {uav: i for i, uav in enumerate(self._uavs)}
         self._ends = np.array([(index[j], index[i]) for j, i in self._edges], dtype=int).reshape(-1, 2)
-        self._plan = _plan(graph, set(subject.leaders))
-        plan = np.array([self._plan[uav] for uav in self._uavs])
-        self._plan_origins, self._plan_vectors = arrows(plan[self._ends[:, 0]], plan[self._ends[:, 1]], 0.16, 0.035)
-        x, y = self._plan_vectors.T / np.linalg.norm(self._plan_vectors, axis=1)
-        self._plan_notes = self._plan_origins + 0.62 * self._plan_vectors + _ASIDE * np.column_stack((y, -x))
+        self._layout = _layout(graph, set(subject.leaders))
+        layout = np.array([self._layout[uav] for uav in self._uavs])
+        self._layout_origins, self._layout_vectors = arrows(
+            layout[self._ends[:, 0]], layout[self._ends[:, 1]], 0.16, 0.035
+        )
+        x, y = self._layout_vectors.T / np.linalg.norm(self._layout_vectors, axis=1)
+        self._layout_notes = (
+            self._layout_origins + 0.62 * self._layout_vectors + _NOTE_OFFSET * np.column_stack((y, -x))
+        )
         """Nearer to who hears, and beside the arrow: those of the two directions stand apart."""
         self._all = np.arange(len(self._edges))
         self._states = np.full(len(self._edges), -1)
@@ -72,12 +76,12 @@ class Links:
         )
 
     def static(self) -> list[Entry]:
-        """The plan: who stands where."""
+        """The layout: who stands where."""
         tints = colors(self._uavs)
         crowded = self._detail.crowded
         names = {} if crowded else {"labels": [self._name(uav) for uav in self._uavs], "show_labels": True}
         nodes = rr.Points2D(
-            [self._plan[uav] for uav in self._uavs],
+            [self._layout[uav] for uav in self._uavs],
             colors=[tints[uav] for uav in self._uavs],
             radii=rr.Radius.ui_points(3.0 if crowded else 7.0),
             draw_order=20.0,
@@ -85,49 +89,49 @@ class Links:
         )
         entries = [Entry("/graph/uavs", None, nodes)]
         if self._edges:
-            shafts = rr.Arrows2D.from_fields(origins=self._plan_origins, vectors=self._plan_vectors)
+            shafts = rr.Arrows2D.from_fields(origins=self._layout_origins, vectors=self._layout_vectors)
             entries.append(Entry("/graph/links", None, shafts))
         return entries
 
     def draw(self, snapshot: Snapshot, positions: NDArray[np.float64], gap: float) -> list[Entry]:
-        """The edges between aircraft at ``positions`` (n, 3), ``gap`` away from them, and their state in the plan."""
+        """The edges between aircraft at ``positions`` (n, 3), ``gap`` away from them, and their state in the layout."""
         if not self._edges:
             return []
         t = snapshot.t
         links = [_link(snapshot.uavs, sender, receiver) for sender, receiver in self._edges]
         states = np.array([self._state(link) for link in links])
-        drawn = self._in_sight(states)
+        drawn = self._visible_edges(states)
         ends = positions[self._ends[drawn]]
         origins, vectors = arrows(ends[:, 0], ends[:, 1], gap, 0.12 * gap)
         entries = [Entry("/world/links", t, rr.Arrows3D.from_fields(origins=origins, vectors=vectors))]
         changed = (states != self._states).any()
         if changed or (drawn is not self._drawn and not np.array_equal(drawn, self._drawn)):
-            tints, widths = self._look(states[drawn])
+            tints, widths = self._style(states[drawn])
             entries.append(Entry("/world/links", t, rr.Arrows3D.from_fields(colors=tints, radii=widths)))
         if changed:
-            tints, widths = self._look(states)
+            tints, widths = self._style(states)
             entries.append(Entry("/graph/links", t, rr.Arrows2D.from_fields(colors=tints, radii=widths)))
         self._states, self._drawn = states, drawn
-        return entries + self._write(snapshot, links) + self._write_names()
+        return entries + self._draw_notes(snapshot, links) + self._draw_names()
 
     def _state(self, link: LinkState | None) -> int:
         if link is not None and link.cut:
             return _CUT
         return _FRESH if link is not None and link.age <= self._subject.stale_after else _STALE
 
-    def _look(self, states: NDArray[np.int_]) -> tuple[NDArray[np.uint8], rr.components.RadiusBatch]:
+    def _style(self, states: NDArray[np.int_]) -> tuple[NDArray[np.uint8], rr.components.RadiusBatch]:
         """Colours and widths of edges."""
         thin = 0.5 if self._detail.crowded else 1.0
         return _TINTS[states], rr.Radius.ui_points(np.where(states == _FRESH, thin, 2.0))
 
-    def _in_sight(self, states: NDArray[np.int_]) -> NDArray[np.intp]:
+    def _visible_edges(self, states: NDArray[np.int_]) -> NDArray[np.intp]:
         """Edges that are drawn among the aircraft: in a big swarm those of the ones in full, and those without news."""
         if not self._detail.crowded:
             return self._all
         full = np.isin(self._uavs, self._detail.shown)
         return np.flatnonzero(full[self._ends].all(axis=1) | (states != _FRESH))
 
-    def _write(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
+    def _draw_notes(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
         """What is wrong with edges; in a big swarm at one edge to a receiver, and at `_NOTES` at most."""
         loss = self._loss(links)
         notes: dict[int, str] = {}
@@ -137,7 +141,7 @@ class Links:
             wrong = wrong[np.argsort(-self._states[wrong], kind="stable")]
         for edge in wrong.tolist():
             receiver = self._edges[edge][1]
-            if _silent(receiver, snapshot) or (self._detail.crowded and receiver in receivers):
+            if _receiver_silent(receiver, snapshot) or (self._detail.crowded and receiver in receivers):
                 continue
             notes[edge] = _note(links[edge], int(self._states[edge]), float(loss[edge]))
             receivers.add(receiver)
@@ -148,7 +152,7 @@ class Links:
         self._notes = notes
         which = list(notes)
         texts = rr.Points2D(
-            self._plan_notes[which],
+            self._layout_notes[which],
             labels=list(notes.values()),
             show_labels=True,
             colors=_TINTS[self._states[which]],
@@ -156,14 +160,14 @@ class Links:
         )
         return [Entry("/graph/notes", snapshot.t, texts)]
 
-    def _write_names(self) -> list[Entry]:
-        """Names in the plan of a big swarm: of those who are drawn in full."""
+    def _draw_names(self) -> list[Entry]:
+        """Names in the layout of a big swarm: of those who are drawn in full."""
         if not self._detail.crowded or self._named == self._detail.shown:
             return []
         self._named = list(self._detail.shown)
         tints = colors(self._uavs)
         names = rr.Points2D(
-            [self._plan[uav] for uav in self._named],
+            [self._layout[uav] for uav in self._named],
             colors=[tints[uav] for uav in self._named],
             radii=rr.Radius.ui_points(6.0),
             labels=[self._name(uav) for uav in self._named],
@@ -178,7 +182,7 @@ class Links:
     def _loss(self, links: list[LinkState | None]) -> NDArray[np.float64]:
         """Share of the records of each edge that were lost of late."""
         now = np.array([(link.received, link.lost) if link is not None else (0, 0) for link in links], float)
-        self._recent += np.maximum(now - self._counted, 0.0) - self._recent / _FORGET
+        self._recent += np.maximum(now - self._counted, 0.0) - self._recent / _LOSS_MEMORY
         self._counted = now
         total = self._recent.sum(axis=1)
         share: NDArray[np.float64] = np.divide(self._recent[:, 1], total, out=np.zeros(len(links)), where=total > 0.5)
@@ -190,10 +194,10 @@ def _link(uavs: Mapping[int, UavState], sender: int, receiver: int) -> LinkState
     return state.links.get(sender) if state is not None else None
 
 
-def _silent(receiver: int, snapshot: Snapshot) -> bool:
+def _receiver_silent(receiver: int, snapshot: Snapshot) -> bool:
     """Whether a UAV that was heard tells no more, so that nobody knows what it hears."""
     state = snapshot.uavs.get(receiver)
-    return state is not None and bool(silent_since(state, snapshot))
+    return state is not None and bool(describe_silence(state, snapshot))
 
 
 def _note(link: LinkState | None, state: int, loss: float) -> str:
@@ -205,7 +209,7 @@ def _note(link: LinkState | None, state: int, loss: float) -> str:
     return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s"
 
 
-def _plan(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:
+def _layout(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:
     """Followers on a circle, leaders outside it near those who hear them; y is down."""
     ring = [uav for uav in sorted(graph.uavs) if uav not in leaders] or sorted(graph.uavs)
     angles = {uav: -0.5 * math.pi + 2.0 * math.pi * i / len(ring) for i, uav in enumerate(ring)}
@@ -213,8 +217,8 @@ def _plan(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:
     taken: list[float] = []
     apart = min(0.4, 0.7 * math.pi / max(1, len(leaders)))
     for leader in sorted(leaders - set(ring)):
-        heard_at = [places[uav] for uav in graph.receivers(leader) if uav in places]
-        angle = math.atan2(sum(y for _, y in heard_at), sum(x for x, _ in heard_at)) if heard_at else -0.5 * math.pi
+        receivers = [places[uav] for uav in graph.receivers(leader) if uav in places]
+        angle = math.atan2(sum(y for _, y in receivers), sum(x for x, _ in receivers)) if receivers else -0.5 * math.pi
         while any(abs(math.remainder(angle - other, 2.0 * math.pi)) < apart for other in taken):
             angle += 0.5 * apart
         taken.append(angle)

@@ -12,7 +12,7 @@ from ftcc.groundside.dashboard.snapshot import Pace, Snapshot
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import GRAY, Color
 
-__all__ = ["PaceCurve", "in_words"]
+__all__ = ["PaceCurve", "describe_pace"]
 
 _ENTITY = "/plots/pace"
 _REACHED: Color = (72, 126, 216)
@@ -20,7 +20,7 @@ _AS_ASKED = 0.02
 """Relative difference up to which the pace counts as the one that was asked for."""
 
 
-def in_words(pace: Pace) -> str:
+def describe_pace(pace: Pace) -> str:
     """The pace in one line: "5.2 x real time (asked: 10): both cores busy, try --pack auto"."""
     reached = "-" if math.isnan(pace.factor) else f"{pace.factor:.2g}" if pace.factor < 10.0 else f"{pace.factor:.0f}"
     if pace.asked is None:

@@ -38,8 +38,8 @@ _MEANINGS = {
     "alpha": ("Angle of attack", "rad"),
     "beta": ("Sideslip", "rad"),
 }
-_ROUND = ("mu", "alpha", "chi")
-"""True states that are told within half a turn, and whose curves go on beyond it."""
+_ANGLES = ("mu", "alpha", "chi")
+"""True states that are recorded within half a turn, and whose curves go on beyond it."""
 _REFERENCES = ("_r", "_ref", "_d", "hat", "_hat", "_id")
 """How the signal is called that says what a state should be, the nearest to the law first."""
 _NO_LIMIT = 2.0 * math.pi
@@ -60,7 +60,7 @@ class Panel:
     value: Where
     second: Where | None = None
     """Drawn thin beside it."""
-    everybody: bool = False
+    include_leaders: bool = False
     """Leaders, too."""
     bound: float | str | None = None
     """A constant, or the signal that bounds the value both ways."""
@@ -71,7 +71,7 @@ class Panel:
     """Shade what lies between the leaders."""
     obstacles: bool = False
     """Draw the top of the obstacle that any UAV is above."""
-    round: bool = False
+    angle: bool = False
     """An angle: its curves go on where it jumps by a turn."""
     degrees: bool = False
     """Show angles in degrees, as the chapters on attitude do."""
@@ -130,11 +130,11 @@ def _motion(subject: Subject) -> list[Panel]:
                 unit=unit,
                 value=("truth", name),
                 second=("signals", references[0]) if references else None,
-                everybody=True,
+                include_leaders=True,
                 band=band,
                 obstacles=obstacles,
                 notes=tuple(notes),
-                round=name in _ROUND,
+                angle=name in _ANGLES,
             )
         )
     return panels
@@ -164,13 +164,13 @@ def _commands(subject: Subject) -> list[Panel]:
 
 
 def _estimates(subject: Subject) -> list[Panel]:
-    told = dict(subject.disturbances)
+    disturbances = dict(subject.disturbances)
     panels = []
     for signal in subject.signals:
         if not re.match(r"(estimated (disturbance|effect|lumped)|unexplained)", signal.meaning):
             continue
         stem = signal.name.removesuffix("_hat")
-        true: Where | None = ("disturbances", stem) if stem in told and stem != signal.name else None
+        true: Where | None = ("disturbances", stem) if stem in disturbances and stem != signal.name else None
         panels.append(
             Panel(
                 path=f"/plots/estimates/{signal.name}",
@@ -213,4 +213,4 @@ def _title(signal: Quantity) -> str:
 
 def uavs_of(panel: Panel, subject: Subject) -> Sequence[int]:
     """Whose curves a panel shows."""
-    return sorted(subject.graph.uavs) if panel.everybody else subject.followers
+    return sorted(subject.graph.uavs) if panel.include_leaders else subject.followers

@@ -9,11 +9,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.labels import name
 from ftcc.groundside.dashboard.panels import Panel, panels_of, uavs_of
 from ftcc.groundside.dashboard.snapshot import Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import name
 from ftcc.groundside.palette import GRAY, Color, colors
 
 __all__ = ["WINDOW", "Plots", "time_series"]
@@ -21,7 +21,7 @@ __all__ = ["WINDOW", "Plots", "time_series"]
 WINDOW = 60.0
 """Time that the plots show, s."""
 
-_REACH: Color = (158, 164, 172)
+_EXTREMES: Color = (158, 164, 172)
 """Of curves that tell how far all UAVs of a big swarm reach."""
 
 Curve = tuple[str, Color, float]
@@ -41,7 +41,7 @@ class Plots:
         self._panels = [panel for panels in self._groups.values() for panel in panels]
         self._angles: dict[tuple[str, int | None], float] = {}
         """Where the curves of angles ended, by panel and UAV."""
-        self._uavs, self._followers = self._whose(everybody=True), self._whose(everybody=False)
+        self._uavs, self._followers = self._curve_uavs(include_leaders=True), self._curve_uavs(include_leaders=False)
         """Whose curves panels show, and whose of them that only followers have."""
 
     def views(self) -> dict[str, list[rrb.View]]:
@@ -54,7 +54,7 @@ class Plots:
         entries = []
         for panel in self._panels:
             names, tints, widths = zip(*self._curves(panel), strict=True)
-            entries.append(Entry(_curves_of(panel), None, rr.SeriesLines(names=names, colors=tints, widths=widths)))
+            entries.append(Entry(_series_path(panel), None, rr.SeriesLines(names=names, colors=tints, widths=widths)))
         return entries
 
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
@@ -62,9 +62,12 @@ class Plots:
         t = snapshot.t
         entries: list[Entry] = []
         if new:
-            self._uavs, self._followers = self._whose(everybody=True), self._whose(everybody=False)
+            self._uavs, self._followers = (
+                self._curve_uavs(include_leaders=True),
+                self._curve_uavs(include_leaders=False),
+            )
             entries += self.static()
-        entries += [Entry(_curves_of(panel), t, rr.Scalars(self._values(panel, snapshot))) for panel in self._panels]
+        entries += [Entry(_series_path(panel), t, rr.Scalars(self._values(panel, snapshot))) for panel in self._panels]
         for panel in self._panels:
             if panel.band:
                 entries += self._band(panel, snapshot)
@@ -72,10 +75,10 @@ class Plots:
 
     def _curves(self, panel: Panel) -> list[Curve]:
         """What `_values` gives, in the same order."""
-        uavs = self._uavs if panel.everybody else self._followers
+        uavs = self._uavs if panel.include_leaders else self._followers
         leaders = self._leaders
         # The farther a curve is behind in this list, the farther in front it is drawn.
-        curves = [("lowest of all", _REACH, 1.0), ("highest of all", _REACH, 1.0)] if self._detail.crowded else []
+        curves = [("lowest of all", _EXTREMES, 1.0), ("highest of all", _EXTREMES, 1.0)] if self._detail.crowded else []
         curves += [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
         if panel.second is not None:
             curves += [self._curve(uav, f" {panel.second[1]}", 0.7) for uav in self._followers]
@@ -96,17 +99,17 @@ class Plots:
         return ("", GRAY, width) if uav is None else (name(uav) + what, self._colors[uav], width)
 
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
-        uavs = self._uavs if panel.everybody else self._followers
-        values = self._reach(panel, snapshot) if self._detail.crowded else []
-        read = {uav: self._going_on(panel, uav, panel.read(panel.value, _state(snapshot, uav))) for uav in {*uavs}}
+        uavs = self._uavs if panel.include_leaders else self._followers
+        values = self._extremes(panel, snapshot) if self._detail.crowded else []
+        read = {uav: self._without_jump(panel, uav, panel.read(panel.value, _state(snapshot, uav))) for uav in {*uavs}}
         values += [read[uav] for uav in uavs]
         followers = [_state(snapshot, uav) for uav in self._followers]
         if panel.second is not None:
             seconds = [panel.read(panel.second, state) for state in followers]
-            if panel.round:
+            if panel.angle:
                 turn = 2.0 * math.pi * panel.scale
                 pairs = zip(self._followers, seconds, strict=True)
-                seconds = [_beside(value, read.get(uav, math.nan), turn) for uav, value in pairs]
+                seconds = [_nearest_turn(value, read.get(uav, math.nan), turn) for uav, value in pairs]
             values += seconds
         if isinstance(panel.bound, str):
             bounds = [abs(panel.read(("signals", panel.bound), state)) for state in followers]
@@ -121,25 +124,25 @@ class Plots:
             values.append(max(beneath, default=math.nan))
         return values
 
-    def _going_on(self, panel: Panel, uav: int | None, value: float) -> float:
+    def _without_jump(self, panel: Panel, uav: int | None, value: float) -> float:
         """An angle without the jump of a turn since the picture before; another value as it is."""
-        if not panel.round or not math.isfinite(value):
+        if not panel.angle or not math.isfinite(value):
             return value
-        value = _beside(value, self._angles.get((panel.path, uav), math.nan), 2.0 * math.pi * panel.scale)
+        value = _nearest_turn(value, self._angles.get((panel.path, uav), math.nan), 2.0 * math.pi * panel.scale)
         self._angles[panel.path, uav] = value
         return value
 
-    def _reach(self, panel: Panel, snapshot: Snapshot) -> list[float]:
+    def _extremes(self, panel: Panel, snapshot: Snapshot) -> list[float]:
         """The lowest and the highest value of all whom a panel is about."""
-        everybody = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
-        told = [value for value in everybody if math.isfinite(value)]
-        return [min(told, default=math.nan), max(told, default=math.nan)]
+        values = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
+        finite = [value for value in values if math.isfinite(value)]
+        return [min(finite, default=math.nan), max(finite, default=math.nan)]
 
-    def _whose(self, everybody: bool) -> list[int | None]:
-        """Whose curves there are, of everybody or of followers; None keeps a place for whoever comes into view."""
+    def _curve_uavs(self, include_leaders: bool) -> list[int | None]:
+        """Whose curves there are, of all or of followers; None keeps a place for whoever comes into view."""
         detail = self._detail
-        places = [*detail.shown, *[None] * (detail.room - len(detail.shown))]
-        if everybody:
+        places = [*detail.shown, *[None] * (detail.capacity - len(detail.shown))]
+        if include_leaders:
             return places
         # Places must not move: a leader that comes into view later leaves an empty one.
         return [None if uav in self._leaders else uav for uav in places if uav not in self._leaders_at_first]
@@ -156,12 +159,12 @@ class Plots:
         return [Entry(f"{panel.path}/hull", snapshot.t, band)]
 
 
-def _curves_of(panel: Panel) -> str:
+def _series_path(panel: Panel) -> str:
     """Entity of a panel's series; a band beside them is an entity of its own."""
     return f"{panel.path}/uavs" if panel.band else panel.path
 
 
-def _beside(angle: float, other: float, turn: float) -> float:
+def _nearest_turn(angle: float, other: float, turn: float) -> float:
     """``angle`` within half a ``turn`` of another one, if that is known."""
     return angle - turn * round((angle - other) / turn) if math.isfinite(angle) and math.isfinite(other) else angle
 
@@ -170,10 +173,10 @@ def _state(snapshot: Snapshot, uav: int | None) -> UavState | None:
     return None if uav is None else snapshot.uavs.get(uav)
 
 
-def _view(panel: Panel, reach: bool) -> rrb.View:
+def _view(panel: Panel, extremes: bool) -> rrb.View:
     unit = f", {panel.shown_unit}" if panel.unit != "-" else ""
-    said = [*panel.notes, *(["pale: extremes of all"] if reach else [])]
-    notes = f" ({', '.join(said)})" if said else ""
+    hints = [*panel.notes, *(["pale: extremes of all"] if extremes else [])]
+    notes = f" ({', '.join(hints)})" if hints else ""
     return time_series(panel.path, f"{panel.title}{unit}{notes}")
 
 

@@ -19,7 +19,7 @@ __all__ = ["RATE", "draw_run", "events_of", "snapshots_of"]
 
 RATE = 10.0
 """Snapshots per simulated second."""
-_CLOSE = 1e-6
+_ROUNDING = 1e-6
 """Rounding of times, s."""
 
 
@@ -34,16 +34,18 @@ class _Links:
 
     def at(self, t: float) -> dict[int, dict[int, LinkState]]:
         """The last report of each link up to ``t``, by receiver and sender."""
-        place = int(np.searchsorted(self._times, t + _CLOSE)) - 1
+        place = int(np.searchsorted(self._times, t + _ROUNDING)) - 1
         if place < 0:
             return {}
         states: dict[int, dict[int, LinkState]] = {}
         before = self._rows(place - 1)
         for edge, (received, lost, oldest) in self._rows(place).items():
             received_before, lost_before, _ = before.get(edge, (0, 0, 0.0))
-            came, went = received - received_before, lost - lost_before
+            received_since, lost_since = received - received_before, lost - lost_before
             age = math.inf if math.isnan(oldest) else oldest
-            states.setdefault(edge[0], {})[edge[1]] = LinkState(age, received, lost, came == 0 and went > 0)
+            states.setdefault(edge[0], {})[edge[1]] = LinkState(
+                age, received, lost, received_since == 0 and lost_since > 0
+            )
         return states
 
     def _rows(self, place: int) -> dict[tuple[int, int], tuple[int, int, float]]:
@@ -90,27 +92,27 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
     times = {uav: run.column("t", uav) for uav in run.uavs}
     links = _Links(run)
     events = events_of(run)
-    told = 0
-    last = math.floor(run.end * rate + _CLOSE)
+    next_event = 0
+    last = math.floor(run.end * rate + _ROUNDING)
     for k in range(last + 1):
         t = k / rate
         states = {}
-        heard = links.at(t)
+        link_states = links.at(t)
         for uav, own in times.items():
-            row = int(np.searchsorted(own, t + _CLOSE)) - 1
+            row = int(np.searchsorted(own, t + _ROUNDING)) - 1
             if row < 0:
                 continue
             values: dict[str, Any] = {
                 group: {name: float(columns[uav][column][row]) for name, column in of_group.items()}
                 for group, of_group in names.items()
             }
-            states[uav] = UavState(t=float(own[row]), links=heard.get(uav, {}), **values)
-        happened = []
+            states[uav] = UavState(t=float(own[row]), links=link_states.get(uav, {}), **values)
+        new_events = []
         # What was logged after the last picture belongs to it.
-        while told < len(events) and (k == last or events[told].t <= t + _CLOSE):
-            happened.append(events[told])
-            told += 1
-        yield Snapshot(t, states, tuple(happened))
+        while next_event < len(events) and (k == last or events[next_event].t <= t + _ROUNDING):
+            new_events.append(events[next_event])
+            next_event += 1
+        yield Snapshot(t, states, tuple(new_events))
 
 
 def draw_run(run: Run, recording: Path, rate: float = RATE) -> Path:

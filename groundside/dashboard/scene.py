@@ -14,13 +14,13 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.labels import is_silent, label
 from ftcc.groundside.dashboard.links import Links
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.snapshot import Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.surroundings import Surroundings
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import is_silent, label
 from ftcc.groundside.palette import Color, colors
 
 __all__ = ["LANE", "TRAIL", "Scene"]
@@ -62,13 +62,13 @@ class Scene:
         """How far each is moved, east and north, m."""
         self._ranks = 1
         self._positions = np.full((len(self._uavs), 3), np.nan)
-        self._place(first)
-        self._take_lanes()
-        self._place(first)
-        seen = self._seen()
-        self._centre: NDArray[np.float64] = seen.mean(axis=0) if len(seen) else np.zeros(3)
-        self._radius = max(30.0, float(np.linalg.norm(seen - self._centre, axis=1).max(initial=0.0)))
-        apart = np.linalg.norm(seen[:, None] - seen[None], axis=2)[~np.eye(len(seen), dtype=bool)]
+        self._update_positions(first)
+        self._assign_lanes()
+        self._update_positions(first)
+        known = self._known_positions()
+        self._centre: NDArray[np.float64] = known.mean(axis=0) if len(known) else np.zeros(3)
+        self._radius = max(30.0, float(np.linalg.norm(known - self._centre, axis=1).max(initial=0.0)))
+        apart = np.linalg.norm(known[:, None] - known[None], axis=2)[~np.eye(len(known), dtype=bool)]
         room = min(0.9 * float(apart.min(initial=np.inf)), 0.3 * self._radius)
         self._scale = max(1, round(room / SPAN))
         names = {signal.name for signal in subject.signals}
@@ -146,13 +146,13 @@ class Scene:
         """Everything that moves; ``new`` are those that have just come into view."""
         t = snapshot.t
         before = self._positions.copy()
-        self._place(snapshot)
+        self._update_positions(snapshot)
         after = self._positions
-        seen = np.isfinite(after[:, 0])
-        if seen.any():
+        known = np.isfinite(after[:, 0])
+        if known.any():
             # Those of a big swarm that are left behind must not drag the view along.
             middle = np.median if self._detail.crowded else np.mean
-            self._centre = middle(after[seen], axis=0)
+            self._centre = middle(after[known], axis=0)
         entries = [Entry("/world/centre", t, rr.Transform3D(translation=self._centre))]
         if new:
             entries += self._shapes(new)
@@ -171,7 +171,7 @@ class Scene:
                 self._labels[uav] = text
                 shown = rr.Points3D.from_fields(labels=text, show_labels=True)
                 entries.append(Entry(f"/world/uav/{uav}/label", t, shown))
-        entries += self._surroundings.draw(snapshot, self._company(snapshot))
+        entries += self._surroundings.draw(snapshot, self._framed_positions(snapshot))
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 
     def _trail_colors(self) -> list[Color]:
@@ -202,28 +202,28 @@ class Scene:
             )
         return [Entry("/world/others", snapshot.t, drawn)]
 
-    def _place(self, snapshot: Snapshot) -> None:
-        told = [
+    def _update_positions(self, snapshot: Snapshot) -> None:
+        true_places = [
             (self._index[uav], state.truth["y"], state.truth["x"], state.truth["z"])
             for uav, state in snapshot.uavs.items()
             if uav in self._index
         ]
-        values = np.array(told, dtype=np.float64).reshape(-1, 4)
+        values = np.array(true_places, dtype=np.float64).reshape(-1, 4)
         values = values[np.isfinite(values).all(axis=1)]
         rows = values[:, 0].astype(int)
         self._positions[rows] = values[:, 1:]
         self._positions[rows, :2] += self._lanes[rows]
 
-    def _where(self, uav: int, truth: Mapping[str, float]) -> NDArray[np.float64]:
+    def _drawn_position(self, uav: int, truth: Mapping[str, float]) -> NDArray[np.float64]:
         east, north = self._lanes[self._index[uav]]
         return np.array((truth["y"] + east, truth["x"] + north, truth["z"]))
 
-    def _take_lanes(self) -> None:
+    def _assign_lanes(self) -> None:
         """Put aircraft of one vertical plane side by side; of a big swarm also those of one line abreast, in ranks."""
-        n, seen = len(self._uavs), self._seen()
-        if n < 2 or not len(seen):
+        n, known = len(self._uavs), self._known_positions()
+        if n < 2 or not len(known):
             return
-        in_plane, abreast = (np.ptp(seen[:, :2], axis=0) < 1.0).tolist()
+        in_plane, abreast = (np.ptp(known[:, :2], axis=0) < 1.0).tolist()
         # Where places along or across the flight mean something, they must stay.
         longitudinal = self._subject.family in ("containment", "formation")
         in_ranks = self._detail.crowded and abreast and longitudinal and not self._subject.obstacles
@@ -238,7 +238,7 @@ class Scene:
             self._lanes[:, 0] -= np.nan_to_num(self._positions[:, 0])
             self._lanes[:, 1] = -_RANK * rank
 
-    def _company(self, snapshot: Snapshot) -> NDArray[np.float64]:
+    def _framed_positions(self, snapshot: Snapshot) -> NDArray[np.float64]:
         """Positions of those about whom a frame is drawn: of a big swarm not of followers who have been left behind."""
         if not self._detail.crowded:
             return self._positions
@@ -250,9 +250,9 @@ class Scene:
         company[left] = np.nan
         return company
 
-    def _seen(self) -> NDArray[np.float64]:
-        seen: NDArray[np.float64] = self._positions[np.isfinite(self._positions[:, 0])]
-        return seen
+    def _known_positions(self) -> NDArray[np.float64]:
+        known: NDArray[np.float64] = self._positions[np.isfinite(self._positions[:, 0])]
+        return known
 
     def _reference(self, t: float, uav: int, state: UavState) -> list[Entry]:
         """The aircraft where, or as, its law wants it."""
@@ -262,4 +262,4 @@ class Scene:
         if not all(map(math.isfinite, wanted.values())):
             return []
         truth = {**state.truth, **wanted}
-        return [Entry(f"/world/reference/{uav}", t, self._poses.of(self._where(uav, truth), truth))]
+        return [Entry(f"/world/reference/{uav}", t, self._poses.of(self._drawn_position(uav, truth), truth))]

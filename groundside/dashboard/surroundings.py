@@ -24,7 +24,7 @@ _OBSTACLE = (*GRAY, 70)
 _BURNT = (*FIRE, 36)
 _FRONT_EVERY = 1.0
 """Time from one front to the next, s: it grows by a metre a second."""
-_DEEP = 200.0
+_OBSTACLE_HEIGHT = 200.0
 """Height of an obstacle that is drawn, from its top downwards, m."""
 
 
@@ -36,8 +36,8 @@ class Surroundings:
 
     def __init__(self, subject: Subject, positions: NDArray[np.float64], in_ranks: bool = False) -> None:
         self._subject = subject
-        seen = positions[np.isfinite(positions[:, 0])] if np.isfinite(positions).any() else np.zeros((1, 3))
-        self._west, self._east = float(seen[:, 0].min()) - _MARGIN, float(seen[:, 0].max()) + _MARGIN
+        known = positions[np.isfinite(positions[:, 0])] if np.isfinite(positions).any() else np.zeros((1, 3))
+        self._west, self._east = float(known[:, 0].min()) - _MARGIN, float(known[:, 0].max()) + _MARGIN
         self._leaders = [sorted(subject.graph.uavs).index(uav) for uav in subject.leaders]
         self._front_at = -math.inf
         apart = len(self._leaders) > 1 and float(np.ptp(positions[self._leaders, 1])) > _APART
@@ -58,10 +58,10 @@ class Surroundings:
         ]
         obstacles = self._subject.obstacles
         if obstacles:
-            half = [((self._east - self._west) / 2, (o.end - o.start) / 2, _DEEP / 2) for o in obstacles]
+            half = [((self._east - self._west) / 2, (o.end - o.start) / 2, _OBSTACLE_HEIGHT / 2) for o in obstacles]
             centre = (self._west + self._east) / 2
             boxes = rr.Boxes3D(
-                centers=[(centre, (o.start + o.end) / 2, o.top - _DEEP / 2) for o in obstacles],
+                centers=[(centre, (o.start + o.end) / 2, o.top - _OBSTACLE_HEIGHT / 2) for o in obstacles],
                 half_sizes=half,
                 colors=[_OBSTACLE] * len(obstacles),
                 fill_mode="TransparentFillMajorWireframe",
@@ -77,16 +77,16 @@ class Surroundings:
         """The border of the fire on the ground, about the centre that the UAVs refer to."""
         if self._subject.fire is None or snapshot.t < self._front_at:
             return []
-        told = (state.signals for state in snapshot.uavs.values() if "fire_north" in state.signals)
-        signals = next(told, None)
+        with_fire = (state.signals for state in snapshot.uavs.values() if "fire_north" in state.signals)
+        signals = next(with_fire, None)
         if signals is None:
             return []
         self._front_at = snapshot.t + _FRONT_EVERY
         t = snapshot.t
-        here = Command(t, signals["fire_north"], signals["fire_east"], 0.0, 0.0)
-        north, east = border(self._subject.fire, [here], t).T
+        centre = Command(t, signals["fire_north"], signals["fire_east"], 0.0, 0.0)
+        north, east = border(self._subject.fire, [centre], t).T
         line = np.column_stack([east, north, np.zeros_like(north)])
-        burning = np.vstack([(here.east, here.north, 0.0), line])
+        burning = np.vstack([(centre.east, centre.north, 0.0), line])
         fan = [(0, i, i + 1) for i in range(1, len(line))]
         area = rr.Mesh3D(vertex_positions=burning, triangle_indices=fan, albedo_factor=_BURNT)
         return [
@@ -99,8 +99,8 @@ class Surroundings:
         leaders = positions[self._leaders]
         if len(leaders) < 2 or not np.isfinite(leaders).all():
             return []
-        seen = positions[np.isfinite(positions[:, 0])]
-        low, high = seen.min(axis=0) - _MARGIN, seen.max(axis=0) + _MARGIN
+        known = positions[np.isfinite(positions[:, 0])]
+        low, high = known.min(axis=0) - _MARGIN, known.max(axis=0) + _MARGIN
         if self._boxed:
             low[1], high[1] = leaders[:, 1].min(), leaders[:, 1].max()
         bottom, top = leaders[:, 2].min(), leaders[:, 2].max()

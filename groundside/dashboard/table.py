@@ -9,17 +9,24 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.groundside.dashboard.detail import Detail
-from ftcc.groundside.dashboard.pace import in_words
+from ftcc.groundside.dashboard.labels import (
+    describe_faults,
+    describe_silence,
+    faulty_actuators,
+    in_trouble,
+    is_silent,
+    name,
+)
+from ftcc.groundside.dashboard.pace import describe_pace
 from ftcc.groundside.dashboard.snapshot import Event, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.dashboard.words import faults, faulty, in_trouble, is_silent, name, silent_since
 
-__all__ = ["Table", "events", "log_view"]
+__all__ = ["Table", "event_entries", "log_view"]
 
-_EVERY = 10
+_PERIOD = 10
 """Snapshots from one table to the next."""
-_MOST = 24
+_MAX_ROWS = 24
 """Rows for UAVs in trouble, in a big swarm."""
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
@@ -30,7 +37,7 @@ class Table:
     def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
         self._detail = detail
-        self._in = 0
+        self._countdown = 0
 
     def view(self) -> rrb.TextDocumentView:
         """The swarm as a table."""
@@ -38,28 +45,28 @@ class Table:
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """The table, if it is due."""
-        due = self._in == 0
-        self._in = (self._in + 1) % _EVERY
+        due = self._countdown == 0
+        self._countdown = (self._countdown + 1) % _PERIOD
         if not due:
             return []
         return [Entry("/swarm", snapshot.t, rr.TextDocument(self._text(snapshot), media_type="text/markdown"))]
 
     def _text(self, snapshot: Snapshot) -> str:
         heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks", "mode")
-        rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in self._in_rows(snapshot))]
+        rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in self._uavs_in_rows(snapshot))]
         # A recording knows no modes.
         shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
-        above = [in_words(snapshot.pace)] if snapshot.pace is not None else []
+        above = [describe_pace(snapshot.pace)] if snapshot.pace is not None else []
         above += [self._summary(snapshot)] if self._detail.crowded else []
         return "\n".join([*(f"{line}\n" for line in above), *(f"| {' | '.join(row[:shown])} |" for row in rows)])
 
-    def _in_rows(self, snapshot: Snapshot) -> list[int]:
+    def _uavs_in_rows(self, snapshot: Snapshot) -> list[int]:
         """Whom the table tells of: everybody; of a big swarm those in trouble, then the others drawn in full."""
         uavs = sorted(self._subject.graph.uavs)
         if not self._detail.crowded:
             return uavs
         states = snapshot.uavs
-        worst = [uav for uav in uavs if uav not in states or in_trouble(states[uav], snapshot)][:_MOST]
+        worst = [uav for uav in uavs if uav not in states or in_trouble(states[uav], snapshot)][:_MAX_ROWS]
         return worst + [uav for uav in sorted(self._detail.shown) if uav not in worst]
 
     def _summary(self, snapshot: Snapshot) -> str:
@@ -69,13 +76,13 @@ class Table:
         counts = {
             "not heard": len(uavs) - len(states),
             "silent": silent,
-            "with faults": sum(bool(faulty(state)) for state in states),
+            "with faults": sum(bool(faulty_actuators(state)) for state in states),
             "late ticks": sum(state.late for state in states),
         }
-        told = "".join(f", {count} {what}" for what, count in counts.items() if count)
+        problems = "".join(f", {count} {what}" for what, count in counts.items() if count)
         altitudes = [state.truth["z"] for state in states]
         reach = f", {min(altitudes):.0f} to {max(altitudes):.0f} m" if altitudes else ""
-        return f"{len(uavs)} UAVs{told or ', all healthy'}{reach}"
+        return f"{len(uavs)} UAVs{problems or ', all healthy'}{reach}"
 
     def _row(self, uav: int, snapshot: Snapshot) -> tuple[str, ...]:
         leads = uav in self._subject.leaders
@@ -83,13 +90,13 @@ class Table:
         state = snapshot.uavs.get(uav)
         if state is None:
             return (label, "", "", "not heard", "", "", "")
-        silent = silent_since(state, snapshot)
-        health = silent or faults(state) or ("" if leads else "healthy")
+        silent = describe_silence(state, snapshot)
+        health = silent or describe_faults(state) or ("" if leads else "healthy")
         z, speed = state.truth["z"], state.truth["V"]
-        return (label, f"{z:.1f}", f"{speed:.2f}", health, _heard(state), str(state.late), state.mode)
+        return (label, f"{z:.1f}", f"{speed:.2f}", health, _describe_links(state), str(state.late), state.mode)
 
 
-def _heard(state: UavState) -> str:
+def _describe_links(state: UavState) -> str:
     links = state.links.values()
     if not links:
         return ""
@@ -106,10 +113,10 @@ def log_view() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/events", name="Events", columns=columns)
 
 
-def events(happened: Iterable[Event]) -> list[Entry]:
+def event_entries(new: Iterable[Event]) -> list[Entry]:
     """Lines of the event log."""
     entries = []
-    for event in happened:
+    for event in new:
         whose = f"{name(event.uav)}: " if event.uav is not None and not event.text.startswith("UAV ") else ""
         asked = f" ({event.who} asked)" if event.who else ""
         outcome = f": {event.outcome}" if event.outcome else ""

@@ -32,9 +32,9 @@ __all__ = ["BLUEPRINT", "Entry", "Kind", "Viewer", "viewer_program", "write"]
 Kind = Literal["web", "native", "none"]
 
 _LOOPBACK = "127.0.0.1"
-_START = 20.0
+_START_TIMEOUT = 20.0
 """Longest wait for the viewer to listen, s."""
-_WAITING = 64
+_QUEUE_SIZE = 64
 """Frames that wait for the viewer; at 10 Hz the six seconds that a slow start takes."""
 
 _BETWEEN_FLUSHES = 0.15
@@ -138,8 +138,8 @@ class Viewer:
         self._problem: str | None = None
         self._reported: set[str] = set()
         self._ended = threading.Event()
-        self._frames: queue.Queue[list[Entry] | None] = queue.Queue(_WAITING)
-        self._words = tempfile.TemporaryFile()  # noqa: SIM115 - the viewer writes to it as long as it runs
+        self._frames: queue.Queue[list[Entry] | None] = queue.Queue(_QUEUE_SIZE)
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115 - the viewer writes to it as long as it runs
         self._page: PageServer | None = None
         self._process = self._start(options)
         if kind == "web" and self._process is not None:
@@ -149,15 +149,15 @@ class Viewer:
                 self._report(f"no page of the viewer: port {page_port}: {error.strerror}")
         if self._page is None:
             self.address = None
-        self._thread = threading.Thread(target=self._feed, name="viewer", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="viewer", daemon=True)
         self._thread.start()
 
-    def show(self, entries: list[Entry], patience: float = 0.0) -> None:
-        """Show ``entries`` soon, or never; waits for a viewer that lags for ``patience`` (wall s) at most."""
+    def show(self, entries: list[Entry], timeout: float = 0.0) -> None:
+        """Show ``entries`` soon, or never; waits for a viewer that lags for ``timeout`` (wall s) at most."""
         if self._ended.is_set():
             return
         try:
-            self._frames.put(entries, patience > 0.0, patience)
+            self._frames.put(entries, timeout > 0.0, timeout)
         except queue.Full:
             self._report(_BEHIND)
 
@@ -196,7 +196,7 @@ class Viewer:
                 self._process.wait()
         # Whatever held the thread back ended with the process; it then sees that the viewer is gone.
         self._thread.join(0.5)
-        self._words.close()
+        self._output.close()
 
     def _start(self, options: list[str]) -> subprocess.Popen[bytes] | None:
         if _listening(self._data_port):
@@ -213,19 +213,19 @@ class Viewer:
             program,
             env=environment,
             stdin=subprocess.DEVNULL,
-            stdout=self._words,
+            stdout=self._output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
 
-    def _feed(self) -> None:
+    def _run(self) -> None:
         try:
-            self._show_all()
+            self._send_frames()
         except Exception as error:  # Whatever happens to the viewer must not happen to the swarm.
             self._report(f"the viewer shows no more: {error}")
         self._ended.set()
 
-    def _show_all(self) -> None:
+    def _send_frames(self) -> None:
         if self._process is None or not self._listens():
             return
         if self.address and self._open_browser and _has_screen():
@@ -245,7 +245,7 @@ class Viewer:
             if sent % _UNREAD == 0:
                 self._wait_for_reader(stream)
             if self._process.poll() is not None:
-                self._report(f"the viewer ended{self._last_words()}; the flight and its recording go on")
+                self._report(f"the viewer ended{self._exit_message()}; the flight and its recording go on")
                 break
         # Until the viewer has read everything, or has ended.
         stream.disconnect()
@@ -264,10 +264,10 @@ class Viewer:
     def _listens(self) -> bool:
         """Wait until the viewer listens; False if it will not."""
         assert self._process is not None
-        deadline = time.monotonic() + _START
+        deadline = time.monotonic() + _START_TIMEOUT
         while time.monotonic() < deadline and not self._ended.is_set():
             if self._process.poll() is not None:
-                self._report(f"no viewer: it ended at once{self._last_words()}")
+                self._report(f"no viewer: it ended at once{self._exit_message()}")
                 return False
             if _listening(self._data_port):
                 return True
@@ -276,10 +276,10 @@ class Viewer:
             self._report("no viewer: it does not answer")
         return False
 
-    def _last_words(self) -> str:
+    def _exit_message(self) -> str:
         assert self._process is not None
-        self._words.seek(0)
-        lines = self._words.read().decode(errors="replace").strip().splitlines()
+        self._output.seek(0)
+        lines = self._output.read().decode(errors="replace").strip().splitlines()
         return f" (exit code {self._process.returncode})" + (f", saying: {lines[-1]}" if lines else "")
 
     def _report(self, problem: str) -> None:

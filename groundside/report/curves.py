@@ -15,7 +15,7 @@ from ftcc.groundside.report.definitions import Panel
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Curve", "Flown", "curves_of", "drawable", "has", "last_time", "uavs_of"]
+__all__ = ["Curve", "Flown", "curves_of", "drawable", "has_columns", "last_time", "uavs_of"]
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Flown:
     label: str
     signals: Signals
     mission: Mission
-    happened: tuple[float, ...] = ()
+    event_times: tuple[float, ...] = ()
     """Times of events, s."""
 
 
@@ -43,11 +43,13 @@ class Curve:
 
 def drawable(panel: Panel, flight: Flown) -> bool:
     """Whether a flight has all that a panel shows, and reaches its window."""
-    asked = [e for e in (panel.y, panel.x, panel.bound, panel.true, panel.reference) if e is not None]
-    return has(flight, asked, panel.pairs) and (panel.window is None or last_time(flight) > panel.window[0])
+    expressions = [e for e in (panel.y, panel.x, panel.bound, panel.true, panel.reference) if e is not None]
+    return has_columns(flight, expressions, panel.pairs) and (
+        panel.window is None or last_time(flight) > panel.window[0]
+    )
 
 
-def has(flight: Flown, expressions: Sequence[str], pairs: Sequence[tuple[int, int]] | None) -> bool:
+def has_columns(flight: Flown, expressions: Sequence[str], pairs: Sequence[tuple[int, int]] | None) -> bool:
     """Whether a flight has the columns and the UAVs that ``expressions`` and ``pairs`` name."""
     graph = flight.mission.graph
     known = {"t", *flight.signals.names, *(DERIVED if graph.leaders else ())}
@@ -80,8 +82,8 @@ def curves_of(
 ) -> Iterator[Curve]:
     """An expression over a flight, a curve per UAV (or per pair: the difference); only where there are rows."""
     graph = flight.mission.graph
-    whom = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
-    for uav, other in whom:
+    compared = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
+    for uav, other in compared:
         t = flight.signals.column("t", uav)
         if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
             continue

@@ -106,11 +106,11 @@ def draw(asked: Sequence[Panel], flights: Sequence[Flown], beside: int = 1) -> A
         heights = [_TALL if any(panels[i].equal for i in row) else 1.0 for row in rows]
         mosaic: Any = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
         size = (_WIDTH, _LEGEND + _ROW * sum(heights))
-        made, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
+        figure, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
         for i, panel in enumerate(panels):
             _draw_panel(axes[str(i)], panel, flights)
-        _legend(made, panels, flights)
-    return made
+        _legend(figure, panels, flights)
+    return figure
 
 
 def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
@@ -197,12 +197,12 @@ def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
 def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
     last = last_time(flight)
     low, high = panel.window or (0.0, last)
-    for t in flight.happened:
+    for t in flight.event_times:
         if low < t < min(high, last):
             axes.axvline(t, color=hexadecimal(GRAY), alpha=0.45, linewidth=0.7, zorder=1)
 
 
-def _legend(made: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> None:
+def _legend(figure: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> None:
     entries: list[Line2D] = []
     if len(flights) > 1:
         entries += [
@@ -228,7 +228,7 @@ def _legend(made: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> Non
     if any(panel.true for panel in panels):
         entries.append(Line2D([], [], color=_INK, linestyle=":", label="true value"))
     if entries:
-        made.legend(handles=entries, loc="outside upper center", ncols=min(len(entries), 8), handlelength=1.6)
+        figure.legend(handles=entries, loc="outside upper center", ncols=min(len(entries), 8), handlelength=1.6)
 
 
 def _uav_entries(panels: Sequence[Panel], flight: Flown) -> list[Line2D]:
@@ -264,7 +264,7 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
     tints = {"info": GRAY, "warning": (214, 140, 20), "error": (214, 48, 48)}
     shapes = {"info": "o", "warning": "D", "error": "X"}
     with plt.rc_context(_STYLE):
-        made, axes = plt.subplots(figsize=(_WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
+        figure, axes = plt.subplots(figsize=(_WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
         for event in marked:
             uav = event.get("uav")
             severity = str(event.get("severity", "info"))
@@ -280,36 +280,36 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
         axes.set(xlabel="t, s", xlim=(-0.01 * last, 1.01 * last), ylim=(0.6 - len(rows), 0.6))
         axes.spines["left"].set_visible(False)
         axes.tick_params(left=False)
-    return made
+    return figure
 
 
 def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
     """Curves (name, colour, times, values) of quantities that are never negative, against time, from zero up."""
     with plt.rc_context(_STYLE):
-        made, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
+        figure, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
         for name, color, t, y in curves:
             axes.plot(*_thinned(t, y), color=color, label=name)
         axes.set(xlabel="t, s", ylabel=label)
         axes.margins(x=0.01)
         axes.set_ylim(bottom=0.0)
-        made.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
-    return made
+        figure.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
+    return figure
 
 
-def save(made: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
+def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
     """Write a figure as SVG, PDF and PNG, and close it."""
     folder.mkdir(parents=True, exist_ok=True)
     buffer = io.StringIO()
     files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
     with plt.rc_context(_STYLE):
         # The layout is found once, not once for each format.
-        made.draw_without_rendering()
-        made.set_layout_engine("none")
-        made.savefig(buffer, format="svg", metadata={"Date": None})
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
         files[0].write_text(_small(buffer.getvalue()), encoding="utf-8")
-        made.savefig(files[1], metadata={"CreationDate": None})
-        made.savefig(files[2], dpi=160, transparent=False)
-    plt.close(made)
+        figure.savefig(files[1], metadata={"CreationDate": None})
+        figure.savefig(files[2], dpi=160, transparent=False)
+    plt.close(figure)
     return Drawn(name, title, number, _for_page(files[0].read_text(encoding="utf-8"), title, name), files)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ftcc.groundside.report.curves import Flown, curves_of, has, last_time
+from ftcc.groundside.report.curves import Flown, curves_of, has_columns, last_time
 from ftcc.groundside.report.definitions import Reading, Sheet
 
 __all__ = ["Compared", "compare"]
@@ -49,7 +49,7 @@ def _compared(number: str, reading: Reading, flight: Flown) -> Compared:
         parts = [part for part in (difference, reading.remark) if part]
         return Compared(number, reading.what, reading.unit, monograph, measured, agrees, "; ".join(parts))
 
-    if not has(flight, [reading.y], reading.pairs):
+    if not has_columns(flight, [reading.y], reading.pairs):
         return result("-", None, "not recorded")
     if reading.window is not None and last_time(flight) < reading.window[1] - 1e-6:
         return result("-", None, "not flown")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_figures", "write_report"]
 
 
-class _Nothing:
+class _EmptyRecording:
     """A recording without a row."""
 
     uavs: tuple[int, ...] = ()
@@ -66,11 +66,11 @@ def _write(run: Run, folder: Path) -> Path:
         end = run.end
     except NothingRecordedError as error:
         notes.append(f"{error}. What follows is what the scenario says and what was logged.")
-        signals, end = _Nothing(), 0.0
+        signals, end = _EmptyRecording(), 0.0
     events = run.events
     results = evaluate(signals, mission.claims, mission.case, mission.graph)
-    happened = tuple(sorted({round(float(event["t"]), 3) for event in events}))
-    flown = Flown(mission.case, signals, mission, happened)
+    event_times = tuple(sorted({round(float(event["t"]), 3) for event in events}))
+    flown = Flown(mission.case, signals, mission, event_times)
     sheet = sheet_of(mission)
     notes += _unfinished(run, mission, end)
     page = Page(
@@ -185,8 +185,8 @@ def _figures_note(sheet: Sheet, mission: Mission) -> str:
 
 def _late_section(run: Run) -> list[Section]:
     """Late ticks by UAV, where there were any."""
-    told: dict[str, int] = next((event["late_of"] for event in reversed(run.events) if "late_of" in event), {})
-    rows = [[Cell(f"UAV {uav}"), Cell(str(late))] for uav, late in told.items() if late]
+    late_by_uav: dict[str, int] = next((event["late_of"] for event in reversed(run.events) if "late_of" in event), {})
+    rows = [[Cell(f"UAV {uav}"), Cell(str(late))] for uav, late in late_by_uav.items() if late]
     if not rows:
         return []
     before = ["Ticks in which a command came too late and the last one was held: the computer was overloaded."]

@@ -58,7 +58,7 @@ class Outcome:
         return "; ".join([self.problem] if self.problem else lost)
 
 
-class _Work(NamedTuple):
+class _Task(NamedTuple):
     """What a process that flies trials must know."""
 
     study: Study
@@ -104,19 +104,19 @@ def fly_all(
     """
     trials = collections.deque(study.trials)
     jobs = min(jobs, len(trials))
-    stop = _semaphores() if jobs > 1 else None
+    stop = _new_stop_event() if jobs > 1 else None
     try:
-        with _heard_ctrl_c() as go_on:
+        with _catch_ctrl_c() as raise_if_interrupted:
             # Compiled once here, or by every process at the same time.
             timing = study.mission.timing._replace(ticks=0)
             fly_in_memory(dataclasses.replace(study.mission, timing=timing))
-            go_on()
+            raise_if_interrupted()
             if ready is not None:
                 ready()
             if stop is None:
-                _fly_here(_Work(study, record_in, None), trials, report, go_on)
+                _fly_here(_Task(study, record_in, None), trials, report, raise_if_interrupted)
             else:
-                _fly_in_pools(_Work(study, record_in, stop), trials, jobs, report, go_on)
+                _fly_in_pools(_Task(study, record_in, stop), trials, jobs, report, raise_if_interrupted)
             return True
     except KeyboardInterrupt:
         return False
@@ -125,7 +125,7 @@ def fly_all(
             stop.set()
 
 
-def _semaphores() -> Any:
+def _new_stop_event() -> Any:
     """What stops the processes, made of the semaphores that they share; None, with a warning, where there are none."""
     try:
         return multiprocessing.get_context("spawn").Event()
@@ -137,36 +137,41 @@ def _semaphores() -> Any:
 
 
 def _fly_here(
-    work: _Work, trials: collections.deque[Trial], report: Callable[[Outcome], None], go_on: Callable[[], None]
+    task: _Task,
+    trials: collections.deque[Trial],
+    report: Callable[[Outcome], None],
+    raise_if_interrupted: Callable[[], None],
 ) -> None:
     """Fly the trials one after the other in this process."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlainPython)
         while trials:
-            outcome = _flown(work, trials.popleft())
-            go_on()  # a flight that Ctrl-C has cut short is no outcome
+            outcome = _fly_trial(task, trials.popleft())
+            raise_if_interrupted()  # a flight that Ctrl-C has cut short is no outcome
             report(outcome)
 
 
 def _fly_in_pools(
-    work: _Work,
+    task: _Task,
     trials: collections.deque[Trial],
     jobs: int,
     report: Callable[[Outcome], None],
-    go_on: Callable[[], None],
+    raise_if_interrupted: Callable[[], None],
 ) -> None:
     """Fly the trials in so many processes at a time."""
     context = multiprocessing.get_context("spawn")
-    pool_of = functools.partial(ProcessPoolExecutor, mp_context=context, initializer=_begin, initargs=(work,))
+    pool_of = functools.partial(
+        ProcessPoolExecutor, mp_context=context, initializer=_initialize_worker, initargs=(task,)
+    )
     while trials:
-        for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report, go_on):
+        for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report, raise_if_interrupted):
             # A process died. Whose fault it was shows when each of those that were in flight flies alone.
-            for guilty in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report, go_on):
-                report(Outcome(guilty, (), {}, 0.0, "its process died"))
+            for dead in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report, raise_if_interrupted):
+                report(Outcome(dead, (), {}, 0.0, "its process died"))
 
 
 @contextlib.contextmanager
-def _heard_ctrl_c() -> Iterator[Callable[[], None]]:
+def _catch_ctrl_c() -> Iterator[Callable[[], None]]:
     """Gives a function that raises KeyboardInterrupt if one was raised before and went unheard.
 
     Python drops one that is raised in a destructor, and a flight that is interrupted only ends early. Outside of the
@@ -179,16 +184,16 @@ def _heard_ctrl_c() -> Iterator[Callable[[], None]]:
         came = True
         raise KeyboardInterrupt
 
-    def go_on() -> None:
+    def raise_if_interrupted() -> None:
         if came:
             raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
-        yield go_on
+        yield raise_if_interrupted
         return
     before = signal.signal(signal.SIGINT, interrupt)
     try:
-        yield go_on
+        yield raise_if_interrupted
     finally:
         signal.signal(signal.SIGINT, before)
 
@@ -198,7 +203,7 @@ def _fly_in_pool(
     trials: collections.deque[Trial],
     jobs: int,
     report: Callable[[Outcome], None],
-    go_on: Callable[[], None],
+    raise_if_interrupted: Callable[[], None],
 ) -> list[Trial]:
     """Fly the trials until none is left or a process dies; those that were in flight then."""
     flying: dict[Future[Outcome], Trial] = {}
@@ -208,7 +213,7 @@ def _fly_in_pool(
                 flying[_submit(pool, trials[0])] = trials[0]
                 trials.popleft()
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
-            go_on()
+            raise_if_interrupted()
             for future in done:
                 outcome = future.result()
                 del flying[future]
@@ -222,12 +227,12 @@ def _fly_in_pool(
 
 def _submit(pool: ProcessPoolExecutor, trial: Trial) -> Future[Outcome]:
     """Hand over a trial; a process that is started for it does not import the program that started us."""
-    with no_main_module(), _one_thread(), _deaf_to_ctrl_c():
-        return pool.submit(_fly, trial)
+    with no_main_module(), _single_threaded(), _block_ctrl_c():
+        return pool.submit(_fly_in_worker, trial)
 
 
 @contextlib.contextmanager
-def _one_thread() -> Iterator[None]:
+def _single_threaded() -> Iterator[None]:
     """Processes started meanwhile use one thread each: the flights are what runs in parallel."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -242,7 +247,7 @@ def _one_thread() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _deaf_to_ctrl_c() -> Iterator[None]:
+def _block_ctrl_c() -> Iterator[None]:
     """Processes started meanwhile leave Ctrl-C to this one, from their first instruction on.
 
     They inherit that SIGINT is blocked. Here it only waits: ignored, one that comes meanwhile would be lost.
@@ -256,36 +261,36 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
 
 # In the processes.
 
-_work: _Work
+_task: _Task
 
 
-def _begin(work: _Work) -> None:
-    global _work
-    _work = work
+def _initialize_worker(task: _Task) -> None:
+    global _task
+    _task = task
     warnings.simplefilter("ignore", PlainPython)
 
 
-def _fly(trial: Trial) -> Outcome:
-    return _flown(_work, trial)
+def _fly_in_worker(trial: Trial) -> Outcome:
+    return _fly_trial(_task, trial)
 
 
-def _flown(work: _Work, trial: Trial) -> Outcome:
+def _fly_trial(task: _Task, trial: Trial) -> Outcome:
     """Fly one trial; whatever goes wrong with it is its outcome."""
-    study, record_in, stop = work
+    study, record_in, stop = task
     mission = study.mission_of(trial)
     if mission is None:
         return Outcome(trial, (), {}, 0.0, study.combinations[trial.combination].problem)
 
-    def go_on(_: float) -> None:
+    def raise_if_interrupted(_: float) -> None:
         if stop is not None and stop.is_set():
             raise _StoppedError
 
     begun = time.perf_counter()
     try:
         flight: Flight | Run = (
-            fly_in_memory(mission, go_on)
+            fly_in_memory(mission, raise_if_interrupted)
             if record_in is None
-            else simulate(mission, run_folder(record_in, trial), go_on)
+            else simulate(mission, run_folder(record_in, trial), raise_if_interrupted)
         )
         results = evaluate(flight, mission.claims, mission.case, mission.graph)
         verdict = flight.verdict

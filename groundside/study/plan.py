@@ -123,16 +123,16 @@ def plan_study(
             raise StudyError(f"--vary {key}: is varied twice; give all its values at once")
         if key == "seed":
             raise StudyError("--vary seed: every combination flies with every seed; use --seeds and --seed")
-    chosen = functools.partial(load, name, form=form, variants=variants)
-    first = chosen(settings=settings, seed=seed, duration=duration)
-    case = _case(chosen())
+    load_variant = functools.partial(load, name, form=form, variants=variants)
+    first = load_variant(settings=settings, seed=seed, duration=duration)
+    case = _conditions_of_case(load_variant())
     combinations = []
     for values in itertools.product(*(variation.values for variation in variations)):
         varied = [f"{key}={_toml(value)}" for key, value in zip(keys, values, strict=True)]
-        scenario = chosen(settings=[*settings, *varied], seed=first.plan.seed, duration=duration)
+        scenario = load_variant(settings=[*settings, *varied], seed=first.plan.seed, duration=duration)
         try:
             mission = resolve(scenario)
-            combinations.append(Combination(values, mission, _essence(mission) == case))
+            combinations.append(Combination(values, mission, _conditions_of(mission) == case))
         except ScenarioError as error:
             combinations.append(Combination(values, None, False, "; ".join(error.problems)))
     if all(combination.problem for combination in combinations):
@@ -143,17 +143,17 @@ def plan_study(
     )
 
 
-def _case(published: Scenario) -> tuple[Any, ...] | None:
+def _conditions_of_case(published: Scenario) -> tuple[Any, ...] | None:
     """The essence of the case that the claims speak of; None where that does not fly."""
     if published.plan.flown and published.plan.flown.settings:
         return None  # a run that was flown with settings of its own
     try:
-        return _essence(resolve(published))
+        return _conditions_of(resolve(published))
     except ScenarioError:
         return None
 
 
-def _essence(mission: Mission) -> tuple[Any, ...]:
+def _conditions_of(mission: Mission) -> tuple[Any, ...]:
     """What makes a flight, but for its length and its chance."""
     timing = mission.timing._replace(ticks=0, seed=0)
     return mission.scheme.name, mission.wire, timing, mission.graph.weights, mission.vehicles, mission.autopilots
@@ -171,7 +171,7 @@ def _variation(text: str) -> Variation:
     try:
         values = tomllib.loads(f"values = [{given}]")["values"]
     except tomllib.TOMLDecodeError:
-        values = [_plain(part.strip()) for part in given.split(",")]
+        values = [_number_or_text(part.strip()) for part in given.split(",")]
     if "" in values:
         raise StudyError(f"--vary {text}: a value is missing between two commas")
     if any(values.count(value) > 1 for value in values):
@@ -179,7 +179,7 @@ def _variation(text: str) -> Variation:
     return Variation(key, tuple(values))
 
 
-def _plain(text: str) -> float | str:
+def _number_or_text(text: str) -> float | str:
     """What TOML would not take: numbers such as .1, and words without quotes."""
     try:
         return float(text)

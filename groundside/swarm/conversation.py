@@ -1,4 +1,4 @@
-"""Question and answer with the autopilots of a running swarm, over MAVLink: asked until answered."""
+"""Question and answer with the autopilots of a running swarm, over MAVLink: request until answered."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.swarm.registry import Card, Entry, find_swarm
+from ftcc.groundside.swarm.registry import Entry, VehicleEntry, find_swarm
 from ftcc.link.codec import Codec
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, NAME_LENGTH, STATION, as_typed, dialect
 from ftcc.link.signing import KeyFileError, Signing, read_key
@@ -24,13 +24,13 @@ __all__ = ["Conversation", "NoAnswerError", "RefusedError", "StationError", "as_
 
 _COMPONENT = dialect.MAV_COMP_ID_MISSIONPLANNER
 _NAN = math.nan
-_LARGEST = float(np.finfo(np.float32).max)
-_AFTERTHOUGHT = 0.1
+_MAX_FLOAT32 = float(np.finfo(np.float32).max)
+_REASON_TIMEOUT = 0.1
 """Wall time for which the reason of a refusal is waited for, s."""
 
 
 class StationError(UserError):
-    """What was asked for did not happen."""
+    """What was request for did not happen."""
 
 
 class NoAnswerError(StationError):
@@ -95,7 +95,7 @@ class Conversation:
         """Ids of its followers."""
         return tuple(uav for uav, card in self._cards.items() if card.role == "follower")
 
-    def card(self, uav: int) -> Card:
+    def card(self, uav: int) -> VehicleEntry:
         """Where a UAV is.
 
         Raises
@@ -123,7 +123,7 @@ class Conversation:
         return self._read(uav, name)[0]
 
     def set(self, uav: int, name: str, value: float) -> float:
-        """Set a parameter; the value in force, which is the one asked for.
+        """Set a parameter; the value in force, which is the one request for.
 
         Raises
         ------
@@ -132,8 +132,8 @@ class Conversation:
         StationError
             If no message can carry it.
         """
-        before, kind = self._read(uav, name)
-        if kind == dialect.MAV_PARAM_TYPE_INT32:
+        before, type_ = self._read(uav, name)
+        if type_ == dialect.MAV_PARAM_TYPE_INT32:
             raw = struct.unpack("<f", struct.pack("<i", _as_int32(name, value)))[0]
 
             def same(one: float) -> bool:
@@ -146,16 +146,16 @@ class Conversation:
 
         if same(before):
             return before
-        message = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, kind)
+        message = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, type_)
         self.texts[uav] = []
 
-        def answers(heard: Any) -> bool:
-            """With the value asked for, or with the former one behind a reason: others answer earlier questions."""
+        def is_answer(heard: Any) -> bool:
+            """With the value request for, or with the former one behind a reason: others answer earlier questions."""
             if heard.get_type() != "PARAM_VALUE" or heard.param_id.upper() != name.upper():
                 return False
             return bool(self.texts[uav]) or same(_value(heard))
 
-        after = _value(self._ask(uav, [message], answers, f"parameter {name}"))
+        after = _value(self._ask(uav, [message], is_answer, f"parameter {name}"))
         if not same(after):
             why = self._reason(uav)
             raise RefusedError(f"UAV {uav}: {name} = {value:.10g} is refused: {why}; the present value is {after:.10g}")
@@ -185,12 +185,12 @@ class Conversation:
         return self._parameter(uav, request, name)
 
     def _parameter(self, uav: int, request: Any, name: str) -> tuple[float, int]:
-        def answers(message: Any) -> bool:
+        def is_answer(message: Any) -> bool:
             return message.get_type() in ("PARAM_VALUE", "PARAM_ERROR") and message.param_id.upper() == name.upper()
 
         if len(name) > NAME_LENGTH:
             raise RefusedError(f"UAV {uav} has no parameter {name}")
-        answer = self._ask(uav, [request], answers, f"parameter {name}")
+        answer = self._ask(uav, [request], is_answer, f"parameter {name}")
         if answer.get_type() == "PARAM_ERROR":
             raise RefusedError(f"UAV {uav} has no parameter {name}")
         return _value(answer), int(answer.param_type)
@@ -224,12 +224,12 @@ class Conversation:
     def request(self, uav: int, message: int) -> Any:
         """A message of a UAV, by REQUEST_MESSAGE."""
         name = dialect.mavlink_map[message].msgname
-        asked = dialect.MAVLink_command_long_message(
+        request = dialect.MAVLink_command_long_message(
             self.system(uav), AUTOPILOT, dialect.MAV_CMD_REQUEST_MESSAGE, 0, message, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN
         )
-        return self._ask(uav, [asked], lambda m: m.get_type() == name, name)
+        return self._ask(uav, [request], lambda m: m.get_type() == name, name)
 
-    def _ask(self, uav: int, requests: list[Any], answers: Callable[[Any], bool], what: str) -> Any:
+    def _ask(self, uav: int, requests: list[Any], is_answer: Callable[[Any], bool], what: str) -> Any:
         """Send a request until it is answered; of several requests the next one each time."""
         while select.select([self._socket], [], [], 0.0)[0]:
             self.receive(uav, 0.0)  # what came before the question does not answer it
@@ -238,7 +238,7 @@ class Conversation:
             until = time.monotonic() + self._timeout * 2**n
             while time.monotonic() < until:
                 for message in self.receive(uav, until):
-                    if answers(message):
+                    if is_answer(message):
                         return message
         seconds = self._timeout * (2**self._tries - 1)
         raise NoAnswerError(f"UAV {uav} of swarm {self.entry.name} does not answer ({what}, {seconds:.1f} s)")
@@ -262,7 +262,7 @@ class Conversation:
 
     def _reason(self, uav: int) -> str:
         """What the UAV says about a refusal."""
-        until = time.monotonic() + _AFTERTHOUGHT
+        until = time.monotonic() + _REASON_TIMEOUT
         while not self.texts.get(uav) and time.monotonic() < until:
             self.receive(uav, until)
         return self.texts[uav][-1] if self.texts.get(uav) else "no reason given"
@@ -283,8 +283,8 @@ def as_float32(name: str, value: float) -> float:
     StationError
         If it is not finite, or too large.
     """
-    if not abs(value) <= _LARGEST:  # also where it is nan
-        raise StationError(f"{name} = {value:.10g}: must be a finite number, at most {_LARGEST:.7g} in size")
+    if not abs(value) <= _MAX_FLOAT32:  # also where it is nan
+        raise StationError(f"{name} = {value:.10g}: must be a finite number, at most {_MAX_FLOAT32:.7g} in size")
     return float(np.float32(value))
 
 

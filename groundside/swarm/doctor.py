@@ -28,7 +28,7 @@ from ftcc.link.ports import PortError, reserve
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Finding", "Prediction", "examine", "machine", "predict", "verdict"]
+__all__ = ["Finding", "Prediction", "describe_machine", "examine", "judge_prediction", "predict"]
 
 _MEASURED = 3.5
 """Wall time over which a flight is measured, s."""
@@ -38,11 +38,11 @@ _LEAST_MEASURED = 1.0
 """Wall time that is enough where a scenario is over sooner, s."""
 _LONGEST = 36_000.0
 """Simulated time to which a short scenario is extended, so that it lasts until it is stopped, s."""
-_BETWEEN = 0.25
+_SAMPLE_PERIOD = 0.25
 """Wall time between two samples, s."""
 _RESERVE = 1.15
 """A speed that is exceeded by less than this factor is held only while nothing else happens on the machine."""
-_NOBODY = (("127.0.0.1", 9), ("127.0.0.1", 9))
+_UNUSED_LISTENERS = (("127.0.0.1", 9), ("127.0.0.1", 9))
 """As many listeners as a flight has; nobody listens on this port (discard)."""
 
 
@@ -87,18 +87,18 @@ def examine(
     """
     from ftcc.groundside.swarm.launcher import automatic_pack
 
-    findings = machine(mission)
+    findings = describe_machine(mission)
     if not mission.wire:
         return [*findings, Finding(mission.name, "an ideal exchange", "flies in one process only: ftcc simulate")]
     uavs = len(mission.vehicles)
     for pack in sorted({automatic_pack(uavs), 1}, reverse=True):
         how = f"--pack auto ({pack})" if pack > 1 else "unpacked"
         progress(f"flying {mission.name} {how} for {seconds:g} s")
-        findings.append(verdict(f"{mission.name}, {how}", predict(mission, pack, seconds), speed))
+        findings.append(judge_prediction(f"{mission.name}, {how}", predict(mission, pack, seconds), speed))
     return findings
 
 
-def machine(mission: Mission) -> list[Finding]:
+def describe_machine(mission: Mission) -> list[Finding]:
     """What there is: interpreter, cores, ports, compiled code, and what only some tests need."""
     from ftcc.link.compiled import cache_folder
 
@@ -138,7 +138,7 @@ def _ports(mission: Mission) -> Finding:
     return Finding("ports", f"{block.base}-{block.base + block.size - 1}", "free")
 
 
-def verdict(what: str, flown: Prediction, speed: float) -> Finding:
+def judge_prediction(what: str, flown: Prediction, speed: float) -> Finding:
     """What a prediction means for who wants ``speed``."""
     if flown.problem:
         return Finding(what, "does not fly", flown.problem)
@@ -176,30 +176,30 @@ class _Watch:
     enough: bool = False
     problems: list[str] = field(default_factory=list)
 
-    def started(self, _address: str | None) -> None:
+    def on_start(self, _address: str | None) -> None:
         """Everybody is ready."""
         self.begun = time.monotonic()
 
-    def hear(self, event: Event) -> None:
+    def on_event(self, event: Event) -> None:
         """Something happened."""
         if event.severity == "error" and event.t <= self.duration:
             self.problems.append(event.text.splitlines()[0])
 
-    def progress(self, t: float, _pace: Pace) -> None:
+    def on_progress(self, t: float, _pace: Pace) -> None:
         """The flight has come to ``t``."""
         now = time.monotonic()
         if self.enough or now - self.begun < _SETTLED:
             return
         if not self.processes:
             self.processes = processes_of(self.folder, os.getpid())
-            self.memory = _memory()
+            self.memory = _used_memory()
             return  # that took its time: ``t`` is old
-        if not self.samples or now - self.samples[-1].wall >= _BETWEEN:
+        if not self.samples or now - self.samples[-1].wall >= _SAMPLE_PERIOD:
             self.samples.append(self.meter.sample(now, t, self.processes, [], os.getpid()))
         if now - self.samples[0].wall >= (self.seconds if t <= self.duration else _LEAST_MEASURED):
             self.enough = True
             # From a thread of its own: the one that flies has to answer.
-            threading.Thread(target=_stop, args=(self.folder.name,), daemon=True).start()
+            threading.Thread(target=_stop_swarm, args=(self.folder.name,), daemon=True).start()
 
 
 def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Prediction:
@@ -220,10 +220,10 @@ def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Predicti
         watch = _Watch(folder, PaceMeter(setup), seconds, mission.timing.duration)
         ticks = round(_LONGEST / mission.timing.period)
         lasting = replace(mission, timing=mission.timing._replace(ticks=max(ticks, mission.timing.ticks)))
-        options = FlightOptions(folder, lockstep=True, speed=math.inf, pack=pack, listeners=_NOBODY)
+        options = FlightOptions(folder, lockstep=True, speed=math.inf, pack=pack, listeners=_UNUSED_LISTENERS)
         processes = 2 * -(-len(uavs) // pack)
         try:
-            outcome = fly_swarm(lasting, options, reserve(uavs), watch.hear, watch.progress, watch.started)
+            outcome = fly_swarm(lasting, options, reserve(uavs), watch.on_event, watch.on_progress, watch.on_start)
         except (TimeoutError, PortError) as error:
             return Prediction(pack, processes, Pace(math.nan, None), 0.0, math.nan, str(error))
     if outcome.stopped and not watch.enough:
@@ -235,7 +235,7 @@ def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Predicti
     return Prediction(pack, processes, pace, watch.memory, watch.begun - watch.created, problem)
 
 
-def _stop(name: str) -> None:
+def _stop_swarm(name: str) -> None:
     """End a running swarm in order."""
     from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 
@@ -246,7 +246,7 @@ def _stop(name: str) -> None:
         print(f"ftcc doctor: {error}", file=sys.stderr)
 
 
-def _memory() -> float:
+def _used_memory() -> float:
     """What this process and all that it has started take, shared memory counted once, bytes."""
     total = 0.0
     for process in (psutil.Process(), *psutil.Process().children(recursive=True)):

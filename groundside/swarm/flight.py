@@ -21,7 +21,7 @@ from ftcc.groundside.swarm.monitor import Monitor
 from ftcc.groundside.swarm.open_files import provide_files
 from ftcc.groundside.swarm.pace import Setup, usable_cores
 from ftcc.groundside.swarm.pacing import Pacing
-from ftcc.groundside.swarm.registry import Card, Control, Entry
+from ftcc.groundside.swarm.registry import ControlSocket, Entry, VehicleEntry
 from ftcc.link.addresses import Address
 from ftcc.link.gcs_sockets import LISTENERS
 from ftcc.link.ports import PortBlock
@@ -37,11 +37,11 @@ Clock = Literal["lockstep", "wall"]
 Viewer = Literal["web", "native", "none"]
 """Where a swarm is shown."""
 
-_LISTENING = 0.02
+_POLL_PERIOD = 0.02
 """Longest wall time between two readings of the telemetry, s."""
-_FIRST_START = 300.0
+_START_TIMEOUT = 300.0
 """Wall time that processes may need to get ready: the first start compiles, s."""
-_LONGEST_END = 5.0
+_END_TIMEOUT = 5.0
 """Wall time that processes may need to end by themselves, s."""
 
 
@@ -72,7 +72,7 @@ def fly_swarm(
     mission: Mission,
     options: FlightOptions,
     ports: PortBlock,
-    say: Callable[[Event], None],
+    report: Callable[[Event], None],
     progress: Progress,
     started: Callable[[str | None], None],
 ) -> Outcome:
@@ -80,7 +80,7 @@ def fly_swarm(
 
     Parameters
     ----------
-    say : called with every event.
+    report : called with every event.
     progress : called with the simulated time and the pace, up to ten times a second.
     started : called once everybody is ready, with the viewer's address or None.
 
@@ -101,7 +101,7 @@ def fly_swarm(
     flight: FlightInProgress
 
     def on_event(event: Event) -> None:
-        flight.note(event)
+        flight.log_event(event)
 
     swarm = Swarm(
         mission,
@@ -121,39 +121,39 @@ def fly_swarm(
     swarm.start()
     station = _station(mission, options, ports, run_started)
     flight = FlightInProgress(
-        mission, swarm, station, None, None, EventLog(folder / "events.jsonl"), say, _pacing(mission, options)
+        mission, swarm, station, None, None, EventLog(folder / "events.jsonl"), report, _pacing(mission, options)
     )
     control = None
-    flown_for = 0.0
+    wall_flown = 0.0
     """Wall time of the flight, s."""
     with _stopping_on_signals(swarm):
         try:
             flight.dashboard = _dashboard(mission, options, ports)
             address = flight.dashboard.address if flight.dashboard else None
-            control = Control(_entry(mission, options, ports, address), flight.obey)
+            control = ControlSocket(_entry(mission, options, ports, address), flight.handle_command)
             flight.feed = Feed(folder.name)
             _wait_until_ready(flight, control)
             started(address)
             swarm.go()
             begun = time.monotonic()
             while not swarm.over:
-                _attend(flight, control, progress)
-            flown_for = time.monotonic() - begun
+                _poll(flight, control, progress)
+            wall_flown = time.monotonic() - begun
             station.read()
             flight.refreshed = 0.0
             flight.refresh(progress)
         finally:
             swarm.stop()
-            until = time.monotonic() + _LONGEST_END
+            until = time.monotonic() + _END_TIMEOUT
             while not swarm.over and time.monotonic() <= until:
-                _attend(flight, None, _unseen)
+                _poll(flight, None, _ignore_progress)
             swarm.release()
-            flight.conclude()
+            flight.judge_flight()
             if control:
                 control.close()
             flight.close()
             ports.release()
-    flight.log_the_end(flown_for)
+    flight.log_end(wall_flown)
     return swarm.outcome
 
 
@@ -172,29 +172,29 @@ def _pacing(mission: Mission, options: FlightOptions) -> Pacing:
     return Pacing(Setup(asked, uavs, options.pack, automatic_pack(uavs), usable_cores()), options.lockstep)
 
 
-def _wait_until_ready(flight: FlightInProgress, control: Control) -> None:
+def _wait_until_ready(flight: FlightInProgress, control: ControlSocket) -> None:
     """Until all processes are ready, or somebody stops the swarm."""
     swarm = flight.swarm
-    until = time.monotonic() + _FIRST_START
+    until = time.monotonic() + _START_TIMEOUT
     while not swarm.ready and swarm.stopping_since is None:
         if time.monotonic() > until:
             names = ", ".join(child.name for child in swarm.children if not child.ready)
-            raise TimeoutError(f"not ready after {_FIRST_START:.0f} s: {names}; see the logs in {swarm.folder}")
-        _attend(flight, control, _unseen)
+            raise TimeoutError(f"not ready after {_START_TIMEOUT:.0f} s: {names}; see the logs in {swarm.folder}")
+        _poll(flight, control, _ignore_progress)
 
 
-def _attend(flight: FlightInProgress, control: Control | None, progress: Progress) -> None:
-    """Wait a little, then take in what processes, vehicles and the command line say, and show it."""
+def _poll(flight: FlightInProgress, control: ControlSocket | None, progress: Progress) -> None:
+    """Wait a little, then take in what processes, vehicles and the command line report, and show it."""
     # The station hears something all the time: it is read now and then.
-    wait([flight.swarm.fileno(), *([control.fileno()] if control else [])], _LISTENING)
-    flight.swarm.attend()
+    wait([flight.swarm.fileno(), *([control.fileno()] if control else [])], _POLL_PERIOD)
+    flight.swarm.poll()
     flight.station.read()
     if control:
         control.serve()
     flight.refresh(progress)
 
 
-def _unseen(_t: float, _pace: Pace) -> None:
+def _ignore_progress(_t: float, _pace: Pace) -> None:
     """Nobody looks at the progress."""
 
 
@@ -206,7 +206,7 @@ def _entry(mission: Mission, options: FlightOptions, ports: PortBlock, address: 
         scenario=mission.name,
         folder=str(folder.resolve()),
         vehicles=tuple(
-            Card(
+            VehicleEntry(
                 spec.uav,
                 spec.uav + options.id_offset,
                 spec.role,

@@ -27,7 +27,7 @@ class Flow:
     period : control period, s.
     speed : simulated seconds per second, at most; inf, in ``lockstep``: as fast as possible.
     held : start held before tick 0.
-    tell : says something to all processes.
+    send : says something to all processes.
     flying : names of the vehicle processes that still fly.
     """
 
@@ -37,13 +37,13 @@ class Flow:
         speed: float,
         lockstep: bool,
         held: bool,
-        tell: Callable[[Any], None],
+        send: Callable[[Any], None],
         flying: Callable[[], Iterable[str]],
     ) -> None:
         self.period = period
         self.speed = speed
         self.lockstep = lockstep
-        self._tell = tell
+        self._send = send
         self._flying = flying
         self._ticks: dict[str, int] = {}
         """Before which tick each process is held."""
@@ -62,9 +62,9 @@ class Flow:
         if self.state == "flying":
             self.state = "holding"
             self._ticks.clear()
-            self._tell(Limit(-1))
+            self._send(Limit(-1))
 
-    def held(self, name: str, tick: int) -> None:
+    def mark_held(self, name: str, tick: int) -> None:
         """A process is held before a tick."""
         self._ticks[name] = tick
         flying = set(self._flying())
@@ -75,7 +75,7 @@ class Flow:
         if len(ticks) == 1:
             self.state = "held"
         else:
-            self._go_on(min(ticks), Limit(self.tick - 1))
+            self._continue_from(min(ticks), Limit(self.tick - 1))
 
     def step(self, ticks: int) -> None:
         """Fly so many ticks and hold again.
@@ -87,7 +87,7 @@ class Flow:
         """
         self._require_held("step")
         self.state = "holding"
-        self._go_on(self.tick, Limit(self.tick + ticks - 1))
+        self._continue_from(self.tick, Limit(self.tick + ticks - 1))
 
     def resume(self) -> None:
         """Let a held swarm fly.
@@ -99,7 +99,7 @@ class Flow:
         """
         self._require_held("resume")
         self.state = "flying"
-        self._go_on(self.tick, Limit(None))
+        self._continue_from(self.tick, Limit(None))
 
     def set_speed(self, speed: float) -> None:
         """Change the pace, in flight or for when it goes on.
@@ -126,14 +126,14 @@ class Flow:
             tick = begun + max(0, int(ahead))
             due = self._pace.wall + (tick - begun) * self.period / self._pace.speed
             self._pace = Pace(due, tick, speed)
-        self._tell(self._pace)
+        self._send(self._pace)
 
     def _require_held(self, what: str) -> None:
         if self.state != "held":
             raise FlowError(f"the swarm is {self.state}: pause it before you {what} it")
 
-    def _go_on(self, tick: int, limit: Limit) -> None:
+    def _continue_from(self, tick: int, limit: Limit) -> None:
         self._ticks.clear()
         self._pace = Pace(time.monotonic() + START, tick, self.speed)
-        self._tell(self._pace)
-        self._tell(limit)
+        self._send(self._pace)
+        self._send(limit)

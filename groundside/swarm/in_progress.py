@@ -38,36 +38,36 @@ class FlightInProgress:
     dashboard: Any
     feed: Feed | None
     log: EventLog
-    say: Callable[[Event], None]
+    report: Callable[[Event], None]
     pacing: Pacing
     next_event: int = 0
     refreshed: float = 0.0
 
-    def note(self, event: Event) -> None:
+    def log_event(self, event: Event) -> None:
         """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
         stamped = event if event.t >= 0.0 else replace(event, t=self.station.t)
-        more = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
-        self._write(stamped, more)
-        self.station.note(stamped)
-        self.say(stamped)
+        extra = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
+        self._write(stamped, extra)
+        self.station.add_event(stamped)
+        self.report(stamped)
 
-    def _write(self, event: Event, more: dict[str, str]) -> None:
-        fine = not self.log.trouble
-        self.log.write(event.t, event.text, event.uav, event.severity, **more)
-        if fine and self.log.trouble:
-            self.note(Event(event.t, "error", f"events are no longer logged: {self.log.trouble}"))
+    def _write(self, event: Event, extra: dict[str, str]) -> None:
+        writable = not self.log.trouble
+        self.log.write(event.t, event.text, event.uav, event.severity, **extra)
+        if writable and self.log.trouble:
+            self.log_event(Event(event.t, "error", f"events are not logged any further: {self.log.trouble}"))
 
-    def scheduled_events(self) -> None:
+    def log_scheduled_events(self) -> None:
         """Note the scenario's own events as their time comes."""
         while self.next_event < len(self.mission.events) and self.mission.events[self.next_event][0] <= self.station.t:
             t, uav, severity, text = self.mission.events[self.next_event]
-            self.note(Event(t, severity, text, uav))
+            self.log_event(Event(t, severity, text, uav))
             self.next_event += 1
 
-    def watch_pace(self) -> None:
+    def measure_pace(self) -> None:
         """Measure how fast the swarm flies, and say where it is too slow."""
         flown = round(self.station.t / self.mission.timing.period) * len(self.mission.vehicles)
-        text = self.pacing.look(
+        text = self.pacing.measure(
             time.monotonic(),
             self.station.t,
             (self.station.late, flown),
@@ -75,18 +75,18 @@ class FlightInProgress:
             self.dashboard.pids if self.dashboard is not None else [],
         )
         if text:
-            self.note(Event(-1.0, "warning", text))
+            self.log_event(Event(-1.0, "warning", text))
 
     def refresh(self, progress: Progress) -> None:
         """Draw the swarm, at most ten times a second."""
         if time.monotonic() - self.refreshed < _REFRESH:
             return
         self.refreshed = time.monotonic()
-        if trouble := self.station.take_trouble():
-            self.note(Event(-1.0, "error", trouble))
-        self.scheduled_events()
+        if error := self.station.take_log_error():
+            self.log_event(Event(-1.0, "error", error))
+        self.log_scheduled_events()
         if self.swarm.flow.state == "flying" and self.station.t > 0.0:
-            self.watch_pace()
+            self.measure_pace()
         progress(self.station.t, self.pacing.pace)
         # The first picture sets the scale: it waits for everybody, but not for ever.
         if not (self.station.complete or self.station.t > 1.0):
@@ -97,9 +97,9 @@ class FlightInProgress:
         if self.dashboard is not None:
             self.dashboard.log(snapshot)
             for problem in self.dashboard.take_problems():
-                self.note(problem)
+                self.log_event(problem)
 
-    def conclude(self) -> None:
+    def judge_flight(self) -> None:
         """Say how the flight went, in its log, its folder and the dashboard, where anything was recorded."""
         run = Run(self.swarm.folder)
         try:
@@ -108,16 +108,18 @@ class FlightInProgress:
             # What has been recorded cannot be read, or is nothing: the log says why.
             return
         except OSError as error:
-            what = f"not merged into signals.parquet: {error.strerror or error}"
-            self.note(Event(-1.0, "error", f"recordings are {what}; `ftcc report` merges them once there is space"))
+            what = (
+                f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` does it once there is room"
+            )
+            self.log_event(Event(-1.0, "error", f"the processes' recordings are {what}"))
             return
         self.swarm.outcome.verdict = verdict
         try:
             (run.path / VERDICT_FILE).write_text(verdict.dumps(), encoding="utf-8")
         except OSError as error:
-            self.note(Event(-1.0, "error", f"{VERDICT_FILE} could not be written: {error.strerror}"))
+            self.log_event(Event(-1.0, "error", f"{VERDICT_FILE} could not be written: {error.strerror}"))
         self.log.write(run.end, verdict.text, severity=verdict.severity)
-        self.station.note(Event(run.end, verdict.severity, verdict.text))
+        self.station.add_event(Event(run.end, verdict.severity, verdict.text))
         if not self.station.complete:
             return
         snapshot = self.station.snapshot()
@@ -126,7 +128,7 @@ class FlightInProgress:
         if self.dashboard is not None:
             self.dashboard.log(snapshot)
 
-    def obey(self, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
+    def handle_command(self, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
         """A command from the control socket.
 
         Raises
@@ -156,25 +158,27 @@ class FlightInProgress:
             case "speed":
                 factor = arguments["factor"]
                 flow.set_speed(math.inf if factor is None else float(factor))
-                self.pacing.ask(flow.speed)
+                self.pacing.set_speed(flow.speed)
                 text = "speed max" if factor is None else f"speed {flow.speed:g}"
             case _:
                 raise ValueError(f"unknown command {command!r}")
         if text:
-            self.note(Event(-1.0, "info", text, who="command line", outcome="accepted"))
+            self.log_event(Event(-1.0, "info", text, who="command line", outcome="accepted"))
         return None
 
-    def log_the_end(self, flown_for: float) -> None:
-        """How fast the swarm flew, ``flown_for`` seconds of wall time in all, as the last entry of the log."""
+    def log_end(self, wall_flown: float) -> None:
+        """How fast the swarm flew, ``wall_flown`` seconds of wall time in all, as the last entry of the log."""
         outcome, pace = self.swarm.outcome, self.pacing.pace
-        if self.station.strangers:
-            self.log.write(self.station.t, f"dropped {self.station.strangers} datagrams of strangers at the station")
+        if self.station.foreign_datagrams:
+            self.log.write(
+                self.station.t, f"dropped {self.station.foreign_datagrams} datagrams of strangers at the station"
+            )
         self.log.write(
             self.station.t,
             f"flight over: {outcome.late} of {outcome.ticks} ticks late",
             late=outcome.late,
             ticks=outcome.ticks,
-            factor=round(outcome.flown * self.mission.timing.period / flown_for, 3) if flown_for else None,
+            factor=round(outcome.flown * self.mission.timing.period / wall_flown, 3) if wall_flown else None,
             asked=pace.asked,
             limit=pace.limit,
             advice=pace.advice,

@@ -1,7 +1,7 @@
 """The launcher: starts a swarm's processes, lets them go together, watches over them, and ends them.
 
 It knows processes, ports and pipes, not physics. Children are forked from a fork server that holds everything compiled;
-each has a log, and its last words are reported if it dies.
+each has a log, and its last tail are reported if it dies.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
 
-_END = 1.2
+_END_TIMEOUT = 1.2
 """Wall time that processes have to end by themselves, s."""
 _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
 """Exit codes after a stop that are nobody's death: also SIGTERM to the whole group, and a fork server gone first."""
-_LAST_WORDS = 12
+_TAIL_LINES = 12
 """Lines of a dead process's log that are reported."""
 _SCHEME_VARIABLE, _PLANT_VARIABLE = "FTCC_PRELOAD_SCHEME", "FTCC_PRELOAD_PLANT"
 """Tell the fork server what to load, see `preload`."""
@@ -67,7 +67,7 @@ class Child:
     ended: Ended | None = None
     dead: bool = False
 
-    def tell(self, message: Any) -> None:
+    def send(self, message: Any) -> None:
         """Say something; a child that is gone will be noticed by its sentinel."""
         with contextlib.suppress(BrokenPipeError, ConnectionResetError, OSError):
             self.pipe.send(message)
@@ -151,7 +151,7 @@ class Swarm:
         self.children: list[Child] = []
         self._selector = selectors.DefaultSelector()
         self.stopping_since: float | None = None
-        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.tell_all, self._flying_vehicles)
+        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.send_to_all, self._flying_vehicles)
         uavs = [spec.uav for spec in mission.vehicles]
         groups = [tuple(uavs[start : start + pack]) for start in range(0, len(uavs), pack)]
         self.setting = Setting(
@@ -223,7 +223,7 @@ class Swarm:
 
     def go(self) -> None:
         """Begin the flight: one epoch for all."""
-        self.tell_all(Go(*self.flow.begin()))
+        self.send_to_all(Go(*self.flow.begin()))
 
     @property
     def flying(self) -> list[Child]:
@@ -234,36 +234,36 @@ class Swarm:
         """Names of the vehicle processes that still fly."""
         return [child.name for child in self.flying if child.kind == "vehicle"]
 
-    def tell_all(self, message: Any) -> None:
+    def send_to_all(self, message: Any) -> None:
         """Say something to every process."""
         for child in self.children:
-            child.tell(message)
+            child.send(message)
 
     def stop(self) -> None:
         """End the flight now, in order."""
         if self.stopping_since is None:
             self.stopping_since = time.monotonic()
             self.outcome.stopped = not self.over
-            self.tell_all(Stop())
+            self.send_to_all(Stop())
 
     def fileno(self) -> int:
         """A descriptor that can be read where a process has said something, or has died."""
         return self._selector.fileno()
 
-    def attend(self) -> None:
+    def poll(self) -> None:
         """Take in what the processes said, and notice who died."""
         for child in {key.data.name: key.data for key, _ in self._selector.select(0.0)}.values():
             with contextlib.suppress(EOFError, ConnectionResetError):
                 while child.pipe.poll():
-                    self._take(child, child.pipe.recv())
+                    self._handle_message(child, child.pipe.recv())
             if not child.process.is_alive():
-                self._bury(child)
-        if self.stopping_since is not None and time.monotonic() - self.stopping_since > _END:
+                self._handle_exit(child)
+        if self.stopping_since is not None and time.monotonic() - self.stopping_since > _END_TIMEOUT:
             for child in self.children:
                 if not (child.ended or child.dead):
                     child.process.kill()
 
-    def _take(self, child: Child, message: Any) -> None:
+    def _handle_message(self, child: Child, message: Any) -> None:
         match message:
             case Ready():
                 child.ready = True
@@ -274,14 +274,14 @@ class Swarm:
                     self.outcome.late += late
                     self.outcome.ticks += ticks
             case Held(tick):
-                self.flow.held(child.name, tick)
+                self.flow.mark_held(child.name, tick)
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
             case EventReport(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 
-    def _bury(self, child: Child) -> None:
+    def _handle_exit(self, child: Child) -> None:
         """A process is gone: say so, end its partner, and let nobody wait for it."""
         child.dead = True
         for source in (child.pipe, child.process.sentinel):
@@ -293,27 +293,27 @@ class Swarm:
             self.outcome.died.append(child.name)
             code = child.process.exitcode
             how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-            words = self.last_words(child.name)
-            self.on_event(Event(-1.0, "error", f"process {child.name} died ({how})" + (f": {words}" if words else "")))
+            tail = self.log_tail(child.name)
+            self.on_event(Event(-1.0, "error", f"process {child.name} died ({how})" + (f": {tail}" if tail else "")))
         for other in self.children:
             if other.uavs == child.uavs:
-                other.tell(Stop())
+                other.send(Stop())
             elif other.kind == "autopilot":
                 for uav in child.uavs:
-                    other.tell(Gone(uav))
+                    other.send(Gone(uav))
 
-    def last_words(self, name: str) -> str:
+    def log_tail(self, name: str) -> str:
         """The end of a process's log."""
         path = self.folder / "logs" / f"{name}.log"
         lines = path.read_text(errors="replace").strip().splitlines() if path.exists() else []
-        return "\n".join(lines[-_LAST_WORDS:])
+        return "\n".join(lines[-_TAIL_LINES:])
 
     def release(self) -> None:
         """Everybody has ended: let them close and wait until they are gone."""
         self._selector.close()
         for child in self.children:
-            child.tell(Release())
-        until = time.monotonic() + _END
+            child.send(Release())
+        until = time.monotonic() + _END_TIMEOUT
         for child in self.children:
             child.process.join(max(0.0, until - time.monotonic()))
             if child.process.is_alive():

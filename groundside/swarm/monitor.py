@@ -14,7 +14,7 @@ from typing import Any
 
 from ftcc.airside.gcs import LINK_FIELDS
 from ftcc.groundside.dashboard import Event, LinkState, Snapshot, UavState
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, TelemetryMessage
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Telemetry, TelemetrySocket
 from ftcc.link.flight_modes import NAMES as MODES
 from ftcc.link.flight_modes import mode_of
 from ftcc.sim.plant import TRUTH
@@ -25,14 +25,14 @@ __all__ = ["Monitor"]
 
 _STAMP = struct.Struct(">Q")
 """What a .tlog has before each message: its Unix time, us."""
-_LINK = 0b11
+_LINK_BITS = 0b11
 """The bits of a stamp in which MAVProxy keeps the number of a link."""
-_LONGEST_US = 10**11
+_MAX_STAMP_US = 10**11
 """No flight lasts longer: a later stamp is none."""
 
 
 @dataclass(slots=True)
-class _Heard:
+class _UavTelemetry:
     """Latest telemetry of one UAV, as numbers: names are given to them when a snapshot is wanted."""
 
     t: float = 0.0
@@ -61,26 +61,26 @@ class Monitor:
         id_offset: int = 0,
         started: float | None = None,
     ) -> None:
-        self._ear = Ear(port, sources)
-        self._uavs = {uav: _Heard() for uav in uavs}
-        self._of_system = {uav + id_offset: heard for uav, heard in self._uavs.items()}
+        self._socket = TelemetrySocket(port, sources)
+        self._uavs = {uav: _UavTelemetry() for uav in uavs}
+        self._of_system = {uav + id_offset: latest for uav, latest in self._uavs.items()}
         self._late = truth_array(plant).index("late")
         self._read_state = _state_reader(find(plant), truth_array(plant), signals)
         self._log = log.open("ab") if log else None
         self._started_us = int((time.time() if started is None else started) * 1e6)
-        self._told_us = 0
-        self._trouble = ""
+        self._newest_us = 0
+        self._log_error = ""
         self._events: list[Event] = []
         self.t = 0.0
         """Newest simulated time heard, s."""
 
     def fileno(self) -> int:
         """For ``select``."""
-        return self._ear.fileno()
+        return self._socket.fileno()
 
     def close(self) -> None:
         """Free the port, finish the log."""
-        self._ear.close()
+        self._socket.close()
         if self._log:
             try:
                 self._log.close()
@@ -90,17 +90,17 @@ class Monitor:
 
     def read(self) -> None:
         """Take in all telemetry that has arrived."""
-        for told in self._ear.hear():
-            if self._log and told:
-                newest = max(one.stamp_us for one in told)
-                if self._told_us < newest <= _LONGEST_US:
-                    self._told_us = newest
-                stamp = _STAMP.pack((self._started_us + self._told_us) & ~_LINK)
-                self._write(b"".join([part for one in told for part in (stamp, one.frame)]))
-            for one in told:
-                heard = self._of_system.get(one.system)
-                if heard is not None:
-                    self._take(heard, one)
+        for messages in self._socket.receive():
+            if self._log and messages:
+                newest = max(message.stamp_us for message in messages)
+                if self._newest_us < newest <= _MAX_STAMP_US:
+                    self._newest_us = newest
+                stamp = _STAMP.pack((self._started_us + self._newest_us) & ~_LINK_BITS)
+                self._write(b"".join([part for message in messages for part in (stamp, message.frame)]))
+            for message in messages:
+                uav = self._of_system.get(message.system)
+                if uav is not None:
+                    self._store(uav, message)
 
     def _write(self, frames: bytes) -> None:
         """Append to the log; one that cannot be written ends."""
@@ -112,76 +112,78 @@ class Monitor:
 
     def _end_log(self, error: OSError) -> None:
         self._log = None
-        self._trouble = f"telemetry is no longer logged: {error.strerror or error}"
+        self._log_error = f"the telemetry is not logged any further: {error.strerror or error}"
 
-    def take_trouble(self) -> str:
+    def take_log_error(self) -> str:
         """Why the log has ended before its time, once; else empty."""
-        trouble, self._trouble = self._trouble, ""
-        return trouble
+        error, self._log_error = self._log_error, ""
+        return error
 
-    def _take(self, heard: _Heard, told: TelemetryMessage) -> None:
-        if told.kind == ARRAY:
-            if told.name == "truth":
-                heard.t = told.stamp_us / 1e6
-                self.t = max(self.t, heard.t)
-                heard.truth = told.values
-            elif told.name == "signals":
-                heard.signals = told.values
-            elif told.name == "links":
-                heard.links = told.values
-        elif told.kind == HEARTBEAT:
-            custom = int(told.values[0])
+    def _store(self, uav: _UavTelemetry, message: Telemetry) -> None:
+        if message.kind == ARRAY:
+            if message.name == "truth":
+                uav.t = message.stamp_us / 1e6
+                self.t = max(self.t, uav.t)
+                uav.truth = message.values
+            elif message.name == "signals":
+                uav.signals = message.values
+            elif message.name == "links":
+                uav.links = message.values
+        elif message.kind == HEARTBEAT:
+            custom = int(message.values[0])
             mode = mode_of(custom >> 16 & 0xFF, custom >> 24)
-            heard.mode = MODES.get(mode, "") if mode is not None else ""
+            uav.mode = MODES.get(mode, "") if mode is not None else ""
 
     @property
-    def strangers(self) -> int:
+    def foreign_datagrams(self) -> int:
         """Datagrams that came from elsewhere."""
-        return self._ear.strangers
+        return self._socket.foreign_datagrams
 
     @property
     def complete(self) -> bool:
         """Whether every UAV has been heard."""
-        return all(heard.truth for heard in self._uavs.values())
+        return all(uav.truth for uav in self._uavs.values())
 
-    def note(self, event: Event) -> None:
+    def add_event(self, event: Event) -> None:
         """Add an event to the next snapshot."""
         self._events.append(event)
 
     @property
     def late(self) -> int:
         """Ticks in which commands came too late, of all UAVs together, as far as was heard."""
-        return sum(int(heard.truth[self._late]) for heard in self._uavs.values() if heard.truth)
+        return sum(int(uav.truth[self._late]) for uav in self._uavs.values() if uav.truth)
 
     def snapshot(self) -> Snapshot:
         """The swarm as heard so far, and what happened since the last call."""
-        uavs = {uav: self._read_state(heard) for uav, heard in self._uavs.items() if heard.truth}
+        uavs = {uav: self._read_state(latest) for uav, latest in self._uavs.items() if latest.truth}
         events, self._events = tuple(self._events), []
         return Snapshot(self.t, uavs, events)
 
 
-def _state_reader(plant: ModuleType, told: Sequence[str], signals: Sequence[str]) -> Callable[[_Heard], UavState]:
+def _state_reader(
+    plant: ModuleType, truth_names: Sequence[str], signals: Sequence[str]
+) -> Callable[[_UavTelemetry], UavState]:
     """What makes a `UavState` of what was heard: by the names of the plant's array "truth" and of the signals."""
-    place = {name: i for i, name in enumerate(told)}
-    names = {
-        "truth": {name: place[name] for name in TRUTH},
-        "command": {name: place[f"{name}_command"] for name in plant.ACTUATORS},
-        "acting": {name: place[name] for name in plant.ACTUATORS},
-        "effectiveness": {name: place[f"{name}_effectiveness"] for name in plant.ACTUATORS},
-        "bias": {name: place[f"{name}_bias"] for name in plant.ACTUATORS},
-        "disturbances": {name: place[name] for name, _ in plant.DISTURBANCES},
+    column = {name: i for i, name in enumerate(truth_names)}
+    columns = {
+        "truth": {name: column[name] for name in TRUTH},
+        "command": {name: column[f"{name}_command"] for name in plant.ACTUATORS},
+        "acting": {name: column[name] for name in plant.ACTUATORS},
+        "effectiveness": {name: column[f"{name}_effectiveness"] for name in plant.ACTUATORS},
+        "bias": {name: column[f"{name}_bias"] for name in plant.ACTUATORS},
+        "disturbances": {name: column[name] for name, _ in plant.DISTURBANCES},
     }
-    groups = [(group, tuple(places), _picker(list(places.values()))) for group, places in names.items()]
-    late = place["late"]
+    groups = [(group, tuple(places), _picker(list(places.values()))) for group, places in columns.items()]
+    late = column["late"]
 
-    def read(heard: _Heard) -> UavState:
-        truth = heard.truth
+    def read(latest: _UavTelemetry) -> UavState:
+        truth = latest.truth
         by_name: dict[str, Any] = {group: dict(zip(keys, pick(truth), strict=True)) for group, keys, pick in groups}
         return UavState(
-            t=heard.t,
-            signals=dict(zip(signals, heard.signals, strict=False)),
-            links=_links(heard.links),
-            mode=heard.mode,
+            t=latest.t,
+            signals=dict(zip(signals, latest.signals, strict=False)),
+            links=_links(latest.links),
+            mode=latest.mode,
             late=int(truth[late]),
             **by_name,
         )

@@ -93,14 +93,14 @@ class Setup:
 
 def usable_cores() -> int:
     """Cores that this process may use: those that it is bound to, or fewer in a container with a limit."""
-    bound = len(_bound_to())
+    bound = len(_allowed_cores())
     if not _CGROUP_LIMIT.exists():
         return bound
     quota, period = _CGROUP_LIMIT.read_text().split()
     return bound if quota == "max" else max(1, min(bound, round(int(quota) / int(period))))
 
 
-def _bound_to() -> Collection[int]:
+def _allowed_cores() -> Collection[int]:
     if hasattr(os, "sched_getaffinity"):
         return os.sched_getaffinity(0)
     return range(os.cpu_count() or 1)
@@ -140,27 +140,27 @@ def judge(earlier: Sample, later: Sample, setup: Setup) -> Pace:
     everybody = (later.busy - earlier.busy) / wall
     foreign = max(0.0, everybody - sum(by_kind.values()))
     if everybody >= _FULL * setup.cores:
-        limit, advice = _full(by_kind, foreign, setup)
+        limit, advice = _limit_of_full_machine(by_kind, foreign, setup)
     else:
-        limit, advice = _alone(of, everybody, setup) or _waiting(by_kind, everybody, setup)
+        limit, advice = _limit_of_one_core(of, everybody, setup) or _limit_of_waiting(by_kind, everybody, setup)
     if setup.asked is not None:
         advice = [*advice, f"--speed {_rounded(0.9 * factor)}"]
     return Pace(factor, setup.asked, limit, " or ".join(advice))
 
 
-def _full(by_kind: Mapping[Kind, float], foreign: float, setup: Setup) -> tuple[str, list[str]]:
+def _limit_of_full_machine(by_kind: Mapping[Kind, float], foreign: float, setup: Setup) -> tuple[str, list[str]]:
     """All cores are busy."""
     full = f"all {setup.cores} cores are busy" if setup.cores > 1 else "the only core is busy"
     if foreign >= _FOREIGN * setup.cores:
         advice = ["fewer other programs (a browser that shows the dashboard is one of them)"]
-        return f"{full}, other programs take {foreign:.1f}", [*advice, *_less_work(by_kind, setup)]
+        return f"{full}, other programs take {foreign:.1f}", [*advice, *_advice_to_save(by_kind, setup)]
     most, *others = sorted(by_kind, key=lambda kind: -by_kind[kind])
     rest = ", ".join(f"{_PLURAL.get(kind, kind)} {by_kind[kind]:.1f}" for kind in others if by_kind[kind] >= 0.05)
     limit = f"{full}, most with {_PLURAL.get(most, f'the {most}')}: {by_kind[most]:.1f}" + (f"; {rest}" if rest else "")
-    return limit, _less_work(by_kind, setup) or ["fewer UAVs, or more cores"]
+    return limit, _advice_to_save(by_kind, setup) or ["fewer UAVs, or more cores"]
 
 
-def _less_work(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
+def _advice_to_save(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
     """What makes the same flight cheaper."""
     advice = []
     if setup.pack < setup.automatic:
@@ -170,7 +170,7 @@ def _less_work(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
     return advice
 
 
-def _alone(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[str, list[str]] | None:
+def _limit_of_one_core(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[str, list[str]] | None:
     """One process, or the two of one group in turn, fill a core while others idle; None if nobody does."""
     flying = {one: load for one, load in of.items() if one.kind in ("vehicle", "autopilot")}
     if not flying:
@@ -195,7 +195,7 @@ def _alone(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[
     return limit, [f"--pack {setup.pack // 2}: smaller packs use more cores"]
 
 
-def _waiting(by_kind: Mapping[Kind, float], everybody: float, setup: Setup) -> tuple[str, list[str]]:
+def _limit_of_waiting(by_kind: Mapping[Kind, float], everybody: float, setup: Setup) -> tuple[str, list[str]]:
     """Cores idle and nobody is short of one."""
     own = sum(by_kind.values())
     limit = f"processes wait for each other's messages: the swarm uses {own:.1f} of {setup.cores} cores"
@@ -221,8 +221,8 @@ class PaceMeter:
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
         self._samples: collections.deque[Sample] = collections.deque()
-        self._known: dict[int, psutil.Process] = {}
-        self._cores = frozenset(_bound_to())
+        self._processes: dict[int, psutil.Process] = {}
+        self._cores = frozenset(_allowed_cores())
 
     def restart(self) -> None:
         """Forget what was measured: after a pause, a step, or a change of speed."""
@@ -268,9 +268,9 @@ class PaceMeter:
     def _used(self, pid: int) -> float | None:
         """Processor time of a process, s; None if it is gone."""
         try:
-            if pid not in self._known:
-                self._known[pid] = psutil.Process(pid)
-            times = self._known[pid].cpu_times()
+            if pid not in self._processes:
+                self._processes[pid] = psutil.Process(pid)
+            times = self._processes[pid].cpu_times()
         except psutil.NoSuchProcess:
             return None
         return float(times.user + times.system)

@@ -13,13 +13,13 @@ from ftcc.groundside.swarm.pace import Kind, PaceMeter, Sample, Setup, judge
 
 __all__ = ["LATE_SHARE", "Pacing"]
 
-_BETWEEN = 1.0
+_PERIOD = 1.0
 """Wall time between two measurements, s."""
-_PATIENCE = 5
+_MISSES_BEFORE_WARNING = 5
 """Measurements in a row that fall short before that is said: a start, or a moment, is no reason."""
 LATE_SHARE = 0.05
 """Share of late ticks from which on the wall clock is overloaded."""
-_LATE_FOR = 2.0
+_LATE_WINDOW = 2.0
 """Wall time for which it must have been, s."""
 
 
@@ -38,13 +38,13 @@ class Pacing:
         self._meter = PaceMeter(setup)
         self._lockstep = lockstep
         self._measured = -math.inf
-        self._short = 0
+        self._misses = 0
         """Measurements in a row that fell short."""
         self._ticks: collections.deque[tuple[float, int, int, Sample]] = collections.deque()
         """Wall time, late ticks, all ticks and who used how much, of the last seconds."""
         self._overloaded = False
 
-    def ask(self, speed: float) -> None:
+    def set_speed(self, speed: float) -> None:
         """Another speed is asked for; inf: as fast as possible."""
         asked = None if math.isinf(speed) else speed
         self._meter.setup = dataclasses.replace(self._meter.setup, asked=asked)
@@ -54,10 +54,10 @@ class Pacing:
         """Begin anew: after a start, a pause, a step or a change of speed."""
         self._meter.restart()
         self._ticks.clear()
-        self._short = 0
+        self._misses = 0
         self.pace = Pace(math.nan, self._meter.setup.asked)
 
-    def look(
+    def measure(
         self,
         wall: float,
         t: float,
@@ -74,31 +74,31 @@ class Pacing:
         processes : name, pid and kind of those that fly.
         viewers : pids of the dashboard's viewer.
         """
-        if wall - self._measured < _BETWEEN:
+        if wall - self._measured < _PERIOD:
             return ""
         self._measured = wall
         processes, viewers = list(processes), list(viewers)
         self.pace = self._meter.measure(wall, t, processes, viewers, os.getpid())
         if self._lockstep:
-            return self._falls_short()
+            return self._check_lockstep()
         sample = self._meter.sample(wall, t, processes, viewers, os.getpid())
-        return self._overload(wall, *ticks, sample)
+        return self._check_wall_clock(wall, *ticks, sample)
 
-    def _falls_short(self) -> str:
+    def _check_lockstep(self) -> str:
         """Lockstep: the speed asked for is not reached."""
-        self._short = self._short + 1 if self.pace.asked is not None and self.pace.limit else 0
-        if self._short != _PATIENCE:
+        self._misses = self._misses + 1 if self.pace.asked is not None and self.pace.limit else 0
+        if self._misses != _MISSES_BEFORE_WARNING:
             return ""
         text = f"{self.pace.factor:.2g} times real time instead of {self.pace.asked:g}: {self.pace.limit}"
         return f"{text}; {self.pace.advice} would help" if self.pace.advice else text
 
-    def _overload(self, wall: float, late: int, ticks: int, sample: Sample) -> str:
+    def _check_wall_clock(self, wall: float, late: int, ticks: int, sample: Sample) -> str:
         """The wall clock: too many ticks are late."""
         self._ticks.append((wall, late, ticks, sample))
-        while len(self._ticks) > 1 and self._ticks[1][0] <= wall - _LATE_FOR:
+        while len(self._ticks) > 1 and self._ticks[1][0] <= wall - _LATE_WINDOW:
             self._ticks.popleft()
         begun, late_before, ticks_before, earlier = self._ticks[0]
-        if wall - begun < _LATE_FOR or ticks == ticks_before:
+        if wall - begun < _LATE_WINDOW or ticks == ticks_before:
             return ""
         share = (late - late_before) / (ticks - ticks_before)
         before, self._overloaded = self._overloaded, share > LATE_SHARE

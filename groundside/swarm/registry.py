@@ -14,15 +14,15 @@ from typing import Any
 from ftcc.groundside.errors import UserError
 from ftcc.link.ports import runtime_folder
 
-__all__ = ["Card", "Control", "Entry", "ask_swarm", "check_name", "find_swarm", "running_swarms"]
+__all__ = ["ControlSocket", "Entry", "VehicleEntry", "ask_swarm", "check_name", "find_swarm", "running_swarms"]
 
 
-_LONGEST_PATH = 107
+_MAX_SOCKET_PATH = 107
 """Of a socket, bytes."""
 
 
 @dataclass(frozen=True)
-class Card:
+class VehicleEntry:
     """A UAV of a running swarm."""
 
     uav: int
@@ -31,9 +31,21 @@ class Card:
     role: str
     """"follower" or "leader"."""
     port: int
-    """Where its autopilot hears whoever calls."""
-    hears: tuple[int, ...]
-    """By whose links it hears."""
+    """On which its autopilot listens to ground stations."""
+    in_neighbours: tuple[int, ...]
+    """UAVs whose state it receives by radio."""
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> VehicleEntry:
+        """Read an entry as `to_json` writes it."""
+        others = {name: value for name, value in data.items() if name != "hears"}
+        return cls(**others, in_neighbours=tuple(data["hears"]))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry as the registry file holds it."""
+        data = asdict(self)
+        data["hears"] = data.pop("in_neighbours")
+        return data
 
 
 @dataclass(frozen=True)
@@ -44,7 +56,7 @@ class Entry:
     pid: int
     scenario: str
     folder: str
-    vehicles: tuple[Card, ...]
+    vehicles: tuple[VehicleEntry, ...]
     key: str | None
     """Key file, where its links to the ground are signed."""
     ports: tuple[int, int]
@@ -54,7 +66,7 @@ class Entry:
     """Wall time, s since 1970."""
 
 
-def _card(name: str) -> Path:
+def _entry_path(name: str) -> Path:
     return runtime_folder() / f"{name}.json"
 
 
@@ -69,7 +81,7 @@ def check_name(name: str) -> None:
     ------
     UserError
     """
-    room = _LONGEST_PATH - len(os.fsencode(runtime_folder())) - len("/.feed")
+    room = _MAX_SOCKET_PATH - len(os.fsencode(runtime_folder())) - len("/.feed")
     if len(os.fsencode(name)) > room:
         raise UserError(
             f"a swarm called {name!r} is listed in {runtime_folder()}: its name may have at most {room} bytes"
@@ -78,7 +90,7 @@ def check_name(name: str) -> None:
         raise UserError(f"a swarm called {name!r} is running; give another folder with --out")
 
 
-def _alive(pid: int) -> bool:
+def _is_alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -94,11 +106,11 @@ def running_swarms() -> list[Entry]:
     for path in sorted(runtime_folder().glob("*.json")):
         try:
             data = json.loads(path.read_text())
-            cards = tuple(Card(**{**card, "hears": tuple(card["hears"])}) for card in data["vehicles"])
-            entry = Entry(**{**data, "vehicles": cards, "ports": tuple(data["ports"])})
+            vehicles = tuple(VehicleEntry.from_json(vehicle) for vehicle in data["vehicles"])
+            entry = Entry(**{**data, "vehicles": vehicles, "ports": tuple(data["ports"])})
         except (ValueError, TypeError, KeyError, FileNotFoundError):
             continue  # being written or removed at this very moment, or not ours
-        if _alive(entry.pid):
+        if _is_alive(entry.pid):
             found.append(entry)
         else:
             for stale in (path, _socket_path(entry.name)):
@@ -148,7 +160,7 @@ def ask_swarm(entry: Entry, command: str, **arguments: Any) -> Any:
     return answer.get("value")
 
 
-class Control:
+class ControlSocket:
     """The launcher's end: a card in the list and a socket that takes commands, a JSON object a line."""
 
     def __init__(self, entry: Entry, handle: Callable[[str, dict[str, Any]], Any]) -> None:
@@ -160,9 +172,10 @@ class Control:
         self._server.bind(str(self._path))
         self._server.listen()
         self._server.setblocking(False)
-        card = _card(entry.name)
-        card.with_suffix(".new").write_text(json.dumps(asdict(entry)))
-        card.with_suffix(".new").rename(card)
+        document = asdict(entry) | {"vehicles": [vehicle.to_json() for vehicle in entry.vehicles]}
+        path = _entry_path(entry.name)
+        path.with_suffix(".new").write_text(json.dumps(document))
+        path.with_suffix(".new").rename(path)
 
     def fileno(self) -> int:
         """For ``select``."""
@@ -186,5 +199,5 @@ class Control:
     def close(self) -> None:
         """Leave the list."""
         self._server.close()
-        _card(self._entry.name).unlink(missing_ok=True)
+        _entry_path(self._entry.name).unlink(missing_ok=True)
         self._path.unlink(missing_ok=True)

@@ -33,7 +33,7 @@ ACTUATORS = {
 
 _NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
 
-_ON_BOARD = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
+_PARTS = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
 
 
 @dataclass
@@ -115,9 +115,9 @@ class Station(Conversation):
         ------
         NoAnswerError, RefusedError
         """
-        if what not in _ON_BOARD:
-            raise StationError(f"{what}: cannot fail; parts that can fail are {', '.join(_ON_BOARD)}")
-        unit, instance = _ON_BOARD[what]
+        if what not in _PARTS:
+            raise StationError(f"{what}: nothing of that name can fail; there are {', '.join(_PARTS)}")
+        unit, instance = _PARTS[what]
         return self.inject(uav, unit, kind, instance, at=at, **sizes)
 
     def repair(self, uav: int, what: str | None = None, *, at: float | None = None) -> None:
@@ -134,7 +134,7 @@ class Station(Conversation):
         """MAV_CMD_INJECT_FAILURE by our names of unit and kind, see `ftcc.link.failures`; the time at which it acts."""
         if unit not in UNITS or kind not in KINDS:
             raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
-        timed = _At(self, uav, at)
+        scheduled = _ScheduledAt(self, uav, at)
         try:
             parameters = {parameter_of(name): value for name, value in sizes.items()}
         except LookupError as error:
@@ -143,7 +143,7 @@ class Station(Conversation):
             as_float32(name, value)
         for name, value in parameters.items():
             self.set(uav, name, value)
-        with timed:
+        with scheduled:
             ack = self.command(uav, dialect.MAV_CMD_INJECT_FAILURE, UNITS[unit].code, KINDS[kind], instance)
         return float(ack.result_param2) / 1e3
 
@@ -161,7 +161,7 @@ class Station(Conversation):
         if b is not None:
             return self._both_ends(a, b, lambda uav, sender: self.inject(uav, "radio", "ok", sender, at=at))
         self.inject(a, "radio", "ok", at=at)
-        return self._at_hearers(a, lambda uav: self.inject(uav, "radio", "ok", a, at=at))
+        return self._at_receivers(a, lambda uav: self.inject(uav, "radio", "ok", a, at=at))
 
     def degrade(self, a: int, b: int | None = None, *, at: float | None = None, **sizes: float) -> list[str]:
         """Degrade the links between two UAVs, or all of one; what went wrong, as `cut`.
@@ -186,16 +186,16 @@ class Station(Conversation):
         if b is not None:
             return self._both_ends(a, b, degrade)
         degrade(a, 0)
-        return self._at_hearers(a, lambda uav: degrade(uav, a))
+        return self._at_receivers(a, lambda uav: degrade(uav, a))
 
     def _both_ends(self, a: int, b: int, do: Callable[[int, int], object]) -> list[str]:
-        ends = [(u, v) for u, v in ((a, b), (b, a)) if v in self.card(u).hears]
+        ends = [(u, v) for u, v in ((a, b), (b, a)) if v in self.card(u).in_neighbours]
         if not ends:
             raise StationError(f"there is no link between UAV {a} and UAV {b}")
         return self._each([u for u, _ in ends], lambda uav: do(uav, b if uav == a else a))
 
-    def _at_hearers(self, a: int, do: Callable[[int], object]) -> list[str]:
-        return self._each([uav for uav in self.uavs if a in self.card(uav).hears], do)
+    def _at_receivers(self, a: int, do: Callable[[int], object]) -> list[str]:
+        return self._each([uav for uav in self.uavs if a in self.card(uav).in_neighbours], do)
 
     def _each(self, uavs: Iterable[int], do: Callable[[int], object]) -> list[str]:
         """Do something at each of several UAVs; what went wrong where, unless it went wrong everywhere."""
@@ -222,7 +222,7 @@ class Station(Conversation):
         """Give a leader another altitude (m) or speed (m/s), at a simulated time (s) or at once."""
         if altitude is None and speed is None:
             raise StationError("a leader needs an altitude or a speed")
-        with _At(self, uav, at):
+        with _ScheduledAt(self, uav, at):
             if altitude is not None:
                 frame = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
                 self.command(uav, dialect.MAV_CMD_DO_CHANGE_ALTITUDE, altitude, frame)
@@ -260,7 +260,7 @@ class Station(Conversation):
         self.send(uav, target)
 
 
-class _At:
+class _ScheduledAt:
     """Parameter FTCC_AT for as long as a request lasts."""
 
     def __init__(self, station: Station, uav: int, at: float | None) -> None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.mavlink import LOOPBACK, STATION
 
-__all__ = ["ARRAY", "HEARTBEAT", "Ear", "TelemetryMessage"]
+__all__ = ["ARRAY", "HEARTBEAT", "Telemetry", "TelemetrySocket"]
 
 HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
 ARRAY = dialect.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY
@@ -26,11 +26,11 @@ _CHECKSUM = 2
 _LARGEST_DATAGRAM = 4096
 _DATAGRAMS_PER_READ = 1024
 """Five times what a hundred UAVs send at once: whoever sends without end must not hold the station."""
-_BUFFER = 4 << 20
+_RECEIVE_BUFFER = 4 << 20
 """Room for what arrives while the station is busy, bytes; the kernel may grant less and drops what does not fit."""
 
 
-class TelemetryMessage(NamedTuple):
+class Telemetry(NamedTuple):
     """A message of a UAV."""
 
     system: int
@@ -47,7 +47,7 @@ class TelemetryMessage(NamedTuple):
     """Its numbers; the custom mode of a HEARTBEAT. Nothing of other messages."""
 
 
-class Ear:
+class TelemetrySocket:
     """Hears datagrams on a port of loopback, from the ports in ``sources`` alone.
 
     Raises
@@ -59,11 +59,11 @@ class Ear:
     def __init__(self, port: int, sources: Collection[int]) -> None:
         self._sources = frozenset((LOOPBACK, source) for source in sources)
         self._codec = Codec(STATION, 1)
-        self.strangers = 0
+        self.foreign_datagrams = 0
         """Datagrams dropped because of where they came from."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._socket.bind((LOOPBACK, port))
 
     def fileno(self) -> int:
@@ -74,7 +74,7 @@ class Ear:
         """Free the port."""
         self._socket.close()
 
-    def hear(self) -> Iterator[list[TelemetryMessage]]:
+    def receive(self) -> Iterator[list[Telemetry]]:
         """What has arrived, a list a datagram; bad data and values that are not finite are dropped."""
         for _ in range(_DATAGRAMS_PER_READ):
             try:
@@ -82,55 +82,55 @@ class Ear:
             except BlockingIOError:
                 return
             if sender in self._sources:
-                yield self.read(datagram)
+                yield self.parse(datagram)
             else:
-                self.strangers += 1
+                self.foreign_datagrams += 1
 
-    def read(self, datagram: bytes) -> list[TelemetryMessage]:
+    def parse(self, datagram: bytes) -> list[Telemetry]:
         """The messages of a datagram, in order."""
-        told = _read(datagram)
-        if told is None:
-            told = [_message_of(message) for message in self._codec.parse(datagram)]
-        return told
+        messages = _parse_frames(datagram)
+        if messages is None:
+            messages = [_from_pymavlink(message) for message in self._codec.parse(datagram)]
+        return messages
 
 
-def _message_of(message: Any) -> TelemetryMessage:
+def _from_pymavlink(message: Any) -> Telemetry:
     """What pymavlink has read."""
     system, kind, frame = message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf())
     if kind == HEARTBEAT:
-        return TelemetryMessage(system, kind, frame, values=(message.custom_mode,))
+        return Telemetry(system, kind, frame, values=(message.custom_mode,))
     stamp = getattr(message, "time_usec", 1000 * getattr(message, "time_boot_ms", 0))
     if kind == ARRAY:
-        return TelemetryMessage(system, kind, frame, message.name, stamp, tuple(message.data))
-    return TelemetryMessage(system, kind, frame, stamp_us=stamp)
+        return Telemetry(system, kind, frame, message.name, stamp, tuple(message.data))
+    return Telemetry(system, kind, frame, stamp_us=stamp)
 
 
-def _read(datagram: bytes) -> list[TelemetryMessage] | None:
-    """The messages of a datagram; None if it is not made of perfect frames of the `_KNOWN` ones alone."""
-    told = []
+def _parse_frames(datagram: bytes) -> list[Telemetry] | None:
+    """The messages of a datagram; None if it is not made of perfect frames of the `_FORMATS` ones alone."""
+    messages = []
     at, end = 0, len(datagram)
     while at < end:
         begin = at + _HEADER
         if end - begin < _CHECKSUM or datagram[at] != _MAGIC or datagram[at + 2] != 0:
             return None
         stop = begin + datagram[at + 1]
-        known = _KNOWN.get(int.from_bytes(datagram[at + 7 : begin], "little"))
-        if known is None or stop + _CHECKSUM > end or stop - begin > known.size:
+        format_ = _FORMATS.get(int.from_bytes(datagram[at + 7 : begin], "little"))
+        if format_ is None or stop + _CHECKSUM > end or stop - begin > format_.size:
             return None
-        checksum = dialect.x25crc(datagram[at + 1 : stop] + known.seed).crc
+        checksum = dialect.x25crc(datagram[at + 1 : stop] + format_.seed).crc
         if checksum != datagram[stop] | datagram[stop + 1] << 8:
             return None
         frame = datagram[at : stop + _CHECKSUM]
         # Zeros at the end of a payload are not sent.
-        one = known.read(datagram[at + 5], known.kind, frame, datagram[begin:stop].ljust(known.size, b"\0"))
-        if one is None:
+        message = format_.read(datagram[at + 5], format_.kind, frame, datagram[begin:stop].ljust(format_.size, b"\0"))
+        if message is None:
             return None
-        told.append(one)
+        messages.append(message)
         at = stop + _CHECKSUM
-    return told
+    return messages
 
 
-class _Known(NamedTuple):
+class _Format(NamedTuple):
     """A message that is read here."""
 
     kind: int
@@ -138,12 +138,12 @@ class _Known(NamedTuple):
     """Bytes of its payload."""
     seed: bytes
     """What its checksum ends with (CRC_EXTRA)."""
-    read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]
+    read: Callable[[int, int, bytes, bytes], Telemetry | None]
     """Of system, kind, frame and whole payload; None where a value is not finite."""
 
 
-def _known(message: Any, read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]) -> tuple[int, _Known]:
-    return message.id, _Known(message.id, message.unpacker.size, bytes([message.crc_extra]), read)
+def _format(message: Any, read: Callable[[int, int, bytes, bytes], Telemetry | None]) -> tuple[int, _Format]:
+    return message.id, _Format(message.id, message.unpacker.size, bytes([message.crc_extra]), read)
 
 
 _STATE = struct.Struct("<I6f")
@@ -153,52 +153,50 @@ _HUD = struct.Struct("<4f")
 _ARRAY = struct.Struct("<QH10s58f")
 
 
-def _heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
-    return TelemetryMessage(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
+def _parse_heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry:
+    return Telemetry(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
 
 
-def _state(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
+def _parse_state(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
     stamp, *values = _STATE.unpack(payload)
-    return TelemetryMessage(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
+    return Telemetry(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
 
 
-def _hud(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
-    return TelemetryMessage(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
+def _parse_hud(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
+    return Telemetry(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
 
 
-def _unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> TelemetryMessage:
-    return TelemetryMessage(system, kind, frame)
+def _parse_unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> Telemetry:
+    return Telemetry(system, kind, frame)
 
 
-def _with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], TelemetryMessage]:
+def _parser_with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], Telemetry]:
     """What reads whole numbers that begin with their time, of so many octets and us a unit."""
 
-    def read(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
-        return TelemetryMessage(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
+    def read(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry:
+        return Telemetry(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
 
     return read
 
 
-def _array(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
+def _parse_array(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
     stamp, _, name, *values = _ARRAY.unpack(payload)
     # The sum of float32 as float64 is finite if, and only if, all are.
     if not math.isfinite(sum(values)):
         return None
-    return TelemetryMessage(
-        system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values)
-    )
+    return Telemetry(system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values))
 
 
-_KNOWN = dict(
+_FORMATS = dict(
     [
-        _known(dialect.MAVLink_heartbeat_message, _heartbeat),
-        _known(dialect.MAVLink_sys_status_message, _unstamped),
-        _known(dialect.MAVLink_attitude_message, _state),
-        _known(dialect.MAVLink_local_position_ned_message, _state),
-        _known(dialect.MAVLink_global_position_int_message, _with_stamp(4, 1000)),
-        _known(dialect.MAVLink_gps_raw_int_message, _with_stamp(8, 1)),
-        _known(dialect.MAVLink_vfr_hud_message, _hud),
-        _known(dialect.MAVLink_servo_output_raw_message, _with_stamp(4, 1)),
-        _known(dialect.MAVLink_debug_float_array_message, _array),
+        _format(dialect.MAVLink_heartbeat_message, _parse_heartbeat),
+        _format(dialect.MAVLink_sys_status_message, _parse_unstamped),
+        _format(dialect.MAVLink_attitude_message, _parse_state),
+        _format(dialect.MAVLink_local_position_ned_message, _parse_state),
+        _format(dialect.MAVLink_global_position_int_message, _parser_with_stamp(4, 1000)),
+        _format(dialect.MAVLink_gps_raw_int_message, _parser_with_stamp(8, 1)),
+        _format(dialect.MAVLink_vfr_hud_message, _parse_hud),
+        _format(dialect.MAVLink_servo_output_raw_message, _parser_with_stamp(4, 1)),
+        _format(dialect.MAVLink_debug_float_array_message, _parse_array),
     ]
 )

@@ -131,14 +131,14 @@ def test_no_more_than_a_few_are_drawn_in_full_if_all_have_faults() -> None:
     crew = subject(100)
     detail = Detail(crew)
     calm = snapshot(100, 1.0)
-    assert detail.follow(calm) == []
+    assert detail.update(calm) == []
     broken = {
         uav: dataclasses.replace(state, effectiveness={"elevator": 0.5}) if state.signals else state
         for uav, state in calm.uavs.items()
     }
-    assert len(detail.follow(Snapshot(1.1, broken))) == TROUBLED
+    assert len(detail.update(Snapshot(1.1, broken))) == TROUBLED
     assert len(detail.shown) == FULL
-    assert detail.follow(Snapshot(1.2, broken)) == []
+    assert detail.update(Snapshot(1.2, broken)) == []
 
 
 def test_edges_without_news_are_drawn_among_the_aircraft(
@@ -178,7 +178,7 @@ def test_a_swarm_that_flies_fast_is_not_taken_for_silent(pace: Pace | None, sile
     late = snapshot(100, 3.0)
     uavs: dict[int, UavState] = dict(late.uavs)
     uavs[9] = dataclasses.replace(uavs[9], t=1.0)
-    assert Detail(subject(100)).follow(Snapshot(3.0, uavs, pace=pace)) == silent
+    assert Detail(subject(100)).update(Snapshot(3.0, uavs, pace=pace)) == silent
 
 
 @pytest.mark.parametrize("apart", [0.0, 30.0])

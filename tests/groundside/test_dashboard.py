@@ -24,7 +24,7 @@ import rerun as rr
 from ftcc.airside.scheme import Quantity
 from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.detail import Detail
-from ftcc.groundside.dashboard.pace import in_words
+from ftcc.groundside.dashboard.pace import describe_pace
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
@@ -349,7 +349,7 @@ def test_the_pace_is_said_and_drawn_from_when_it_is_told(tmp_path: Path, told_fr
     ],
 )
 def test_the_pace_in_words(pace: Pace, words: str) -> None:
-    assert in_words(pace) == words
+    assert describe_pace(pace) == words
 
 
 def test_a_killed_recording_is_readable_to_its_last_seconds(tmp_path: Path) -> None:

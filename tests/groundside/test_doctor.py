@@ -9,7 +9,7 @@ import pytest
 from ftcc.groundside.dashboard.snapshot import Pace
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.swarm.doctor import Prediction, examine, predict, verdict
+from ftcc.groundside.swarm.doctor import Prediction, examine, judge_prediction, predict
 
 LIMITED = Pace(5.0, None, "all 2 cores are busy, most with autopilots: 1.2", "--pack auto")
 
@@ -19,27 +19,29 @@ def flown(pace: Pace, problem: str = "") -> Prediction:
 
 
 def test_a_speed_with_room_to_spare_is_held():
-    found = verdict("demo", flown(LIMITED), speed=4.0)
+    found = judge_prediction("demo", flown(LIMITED), speed=4.0)
     assert found.found == "5.0 times real time, 16 processes, 1.0 GB, ready after 2 s"
     assert found.verdict == "ok: holds --speed 4"
 
 
 def test_a_speed_that_is_only_just_held_is_called_tight():
-    assert verdict("demo", flown(LIMITED), speed=4.8).verdict.startswith("tight at --speed 4.8: all 2 cores are busy")
+    assert judge_prediction("demo", flown(LIMITED), speed=4.8).verdict.startswith(
+        "tight at --speed 4.8: all 2 cores are busy"
+    )
 
 
 def test_a_speed_that_is_out_of_reach_comes_with_the_limit_and_advice():
-    said = verdict("demo", flown(LIMITED), speed=10.0).verdict
+    said = judge_prediction("demo", flown(LIMITED), speed=10.0).verdict
     assert said == "too slow for --speed 10: all 2 cores are busy, most with autopilots: 1.2; --pack auto"
 
 
 def test_who_wants_whatever_can_be_had_hears_the_limit():
-    assert verdict("demo", flown(LIMITED), speed=math.inf).verdict == f"{LIMITED.limit}; {LIMITED.advice}"
+    assert judge_prediction("demo", flown(LIMITED), speed=math.inf).verdict == f"{LIMITED.limit}; {LIMITED.advice}"
 
 
 def test_a_flight_that_fails_or_is_too_short_says_so():
-    assert verdict("demo", flown(LIMITED, "not ready after 300 s"), 1.0).verdict == "not ready after 300 s"
-    assert verdict("demo", flown(Pace(math.nan, None)), 1.0).found == "too short to tell"
+    assert judge_prediction("demo", flown(LIMITED, "not ready after 300 s"), 1.0).verdict == "not ready after 300 s"
+    assert judge_prediction("demo", flown(Pace(math.nan, None)), 1.0).found == "too short to tell"
 
 
 def test_what_has_an_ideal_exchange_is_not_flown_with_processes():

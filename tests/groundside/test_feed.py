@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import pytest
 
 from ftcc.groundside import feed as feed_module
-from ftcc.groundside.dashboard.feed import Feed, decoded, encoded, feed_path, watched
+from ftcc.groundside.dashboard.feed import Feed, decode, encode, feed_path, watch_swarm
 from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot
 from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot
 
@@ -35,19 +35,19 @@ def stuck(name: str) -> socket.socket:
 
 def test_a_snapshot_arrives_as_it_was_sent() -> None:
     sent = snapshot(21.0, HAPPENINGS)
-    assert decoded(encoded(sent)) == sent
+    assert decode(encode(sent)) == sent
 
 
 def test_the_pace_arrives_as_it_was_sent() -> None:
     pace = Pace(5.2, None, "both cores busy", "try --pack auto")
     sent = dataclasses.replace(snapshot(1.0), pace=pace)
-    assert decoded(encoded(sent)) == sent
+    assert decode(encode(sent)) == sent
 
 
 def test_what_is_not_known_arrives_as_not_known() -> None:
     plain = snapshot(1.0)
     state = dataclasses.replace(plain.uavs[1], truth={"z": math.nan}, links={2: LinkState(math.inf, 0, 0, False)})
-    arrived = decoded(encoded(Snapshot(1.0, {1: state}))).uavs[1]
+    arrived = decode(encode(Snapshot(1.0, {1: state}))).uavs[1]
     assert math.isnan(arrived.truth["z"])
     assert arrived.links[2].age == math.inf
 
@@ -55,18 +55,18 @@ def test_what_is_not_known_arrives_as_not_known() -> None:
 @pytest.mark.parametrize("line", [b"", b"{}\n", b"[1]\n", b'{"t": 1, "uavs": {"x": 1}, "events": []}\n'])
 def test_what_is_no_snapshot_is_refused(line: bytes) -> None:
     with pytest.raises(ValueError, match=r"no snapshot|Expecting|invalid literal"):
-        decoded(line)
+        decode(line)
 
 
 def test_nothing_is_encoded_while_nobody_watches(feed: tuple[Feed, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(feed_module, "encoded", lambda _: pytest.fail("encoded for nobody"))
+    monkeypatch.setattr(feed_module, "encode", lambda _: pytest.fail("encoded for nobody"))
     feed[0].offer(snapshot(1.0))
 
 
 def test_a_watcher_that_reads_gets_everything_from_then_on(feed: tuple[Feed, str]) -> None:
     station, name = feed
     got: list[Snapshot] = []
-    reader = threading.Thread(target=lambda: got.extend(watched(name)))
+    reader = threading.Thread(target=lambda: got.extend(watch_swarm(name)))
     link = stuck(name)  # so that the first snapshots are sent at all
     reader.start()
     sent = list(flight(5.0))
@@ -83,9 +83,9 @@ def test_a_watcher_that_reads_gets_everything_from_then_on(feed: tuple[Feed, str
 def test_a_watcher_that_does_not_read_costs_nothing_and_misses_no_event(feed: tuple[Feed, str]) -> None:
     station, name = feed
     link = stuck(name)
-    told = [Event(t / 10.0, "info", f"event {t}") for t in range(2000)]
+    sent = [Event(t / 10.0, "info", f"event {t}") for t in range(2000)]
     took = []
-    for event in told:
+    for event in sent:
         begun = time.perf_counter()
         station.offer(snapshot(event.t, (event,)))
         took.append(time.perf_counter() - begun)
@@ -94,10 +94,10 @@ def test_a_watcher_that_does_not_read_costs_nothing_and_misses_no_event(feed: tu
     arrived: list[Event] = []
     link.settimeout(0.5)
     lines = link.makefile("rb")
-    while len(arrived) < len(told):
+    while len(arrived) < len(sent):
         station.offer(snapshot(300.0))
-        arrived += decoded(lines.readline()).events
-    assert arrived == told
+        arrived += decode(lines.readline()).events
+    assert arrived == sent
     link.close()
 
 
@@ -109,10 +109,10 @@ def test_nothing_is_encoded_for_a_watcher_that_does_not_read(
     lines: list[bytes] = []
 
     def counted(snap: Snapshot) -> bytes:
-        lines.append(encoded(snap))
+        lines.append(encode(snap))
         return lines[-1]
 
-    monkeypatch.setattr(feed_module, "encoded", counted)
+    monkeypatch.setattr(feed_module, "encode", counted)
     for t in range(500):
         station.offer(snapshot(float(t)))
     room = len(lines)
@@ -132,4 +132,4 @@ def test_a_watcher_that_dies_is_forgotten(feed: tuple[Feed, str]) -> None:
 
 def test_a_swarm_that_is_gone_cannot_be_watched() -> None:
     with pytest.raises(OSError, match="No such file"):
-        next(watched("nobody"))
+        next(watch_swarm("nobody"))

@@ -27,7 +27,7 @@ class Swarm:
             assert limit is not None
             for name in self.ticks:
                 self.ticks[name] = max(self.ticks[name], limit + 1)
-                self.flow.held(name, self.ticks[name])
+                self.flow.mark_held(name, self.ticks[name])
 
 
 def test_a_pause_brings_everybody_to_the_tick_of_the_foremost():

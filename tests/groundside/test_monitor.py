@@ -1,4 +1,4 @@
-"""The ground station's ear: from the bytes it reads what pymavlink reads, and it refuses what pymavlink refuses."""
+"""The ground station's receiver: it reads and refuses what pymavlink reads and refuses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from ftcc.groundside.dashboard.snapshot import LinkState
 from ftcc.groundside.swarm.monitor import Monitor
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Ear, TelemetryMessage
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Telemetry, TelemetrySocket
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.flight_modes import MISSION, custom_mode
 from ftcc.link.mavlink import float_array
@@ -30,8 +30,8 @@ SIGNALS = ("S1", "zhat")
 
 
 @pytest.fixture
-def ear() -> Iterator[Ear]:
-    made = Ear(0, ())
+def receiver() -> Iterator[TelemetrySocket]:
+    made = TelemetrySocket(0, ())
     yield made
     made.close()
 
@@ -53,10 +53,10 @@ def station(pilot: socket.socket, tmp_path: Path) -> Iterator[Monitor]:
     made.close()
 
 
-def as_pymavlink_reads(datagram: bytes) -> list[TelemetryMessage]:
+def as_pymavlink_reads(datagram: bytes) -> list[Telemetry]:
     told = []
     for message in Codec(254, 1).parse(datagram):
-        read = TelemetryMessage(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
+        read = Telemetry(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
         if read.kind == HEARTBEAT:
             read = read._replace(values=(message.custom_mode,))
         if read.kind == ARRAY:
@@ -111,37 +111,41 @@ def damaged(datagram: bytes, draw: random.Random) -> bytes:
     return bytes(octets)
 
 
-def test_whatever_comes_is_read_as_pymavlink_reads_it(ear: Ear) -> None:
+def test_whatever_comes_is_read_as_pymavlink_reads_it(receiver: TelemetrySocket) -> None:
     draw = random.Random(5)
     codecs = [Codec(system, 1) for system in (1, 7, 200)]
     for _ in range(3000):
         messages = [some_message(draw) for _ in range(draw.randrange(1, 5))]
         datagram = damaged(draw.choice(codecs).pack(*messages), draw)
-        assert ear.read(datagram) == as_pymavlink_reads(datagram)
+        assert receiver.parse(datagram) == as_pymavlink_reads(datagram)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_value_that_is_not_finite_is_refused_and_its_neighbours_are_taken(ear: Ear, value: float) -> None:
+def test_a_value_that_is_not_finite_is_refused_and_its_neighbours_are_taken(
+    receiver: TelemetrySocket, value: float
+) -> None:
     datagram = Codec(1, 1).pack(float_array(10, "truth", [1.0, 2.0]), float_array(11, "signals", [3.0]))
     bad = bytearray(datagram)
     bad[30:34] = struct.pack("<f", value)  # the first number of the first message
     end = 10 + bad[1]
     bad[end : end + 2] = struct.pack("<H", dialect.x25crc(bytes(bad[1:end]) + b"\xe8").crc)
-    assert [told.name for told in ear.read(bytes(bad))] == ["signals"]
-    assert ear.read(bytes(bad)) == as_pymavlink_reads(bytes(bad))
+    assert [told.name for told in receiver.parse(bytes(bad))] == ["signals"]
+    assert receiver.parse(bytes(bad)) == as_pymavlink_reads(bytes(bad))
 
 
-def test_signed_and_old_messages_are_read_as_ever(ear: Ear, tmp_path: Path) -> None:
+def test_signed_and_old_messages_are_read_as_ever(receiver: TelemetrySocket, tmp_path: Path) -> None:
     message = float_array(10, "truth", [1.0, 2.0])
     signed = Codec(1, 1, Signing(b"k" * 32, tmp_path / "stamps.json")).pack(message)
     first = bytes(dialect.MAVLink_heartbeat_message(1, 12, 129, 7, 4, 3).pack(dialect.MAVLink(None, 3, 1), True))
     for datagram in (signed, first, first + signed):
-        assert len(ear.read(datagram)) >= 1
-        assert ear.read(datagram) == as_pymavlink_reads(datagram)
+        assert len(receiver.parse(datagram)) >= 1
+        assert receiver.parse(datagram) == as_pymavlink_reads(datagram)
 
 
-def test_what_comes_again_and_again_does_not_need_pymavlink(ear: Ear, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ear._codec, "parse", lambda _: pytest.fail("parsed"))
+def test_what_comes_again_and_again_does_not_need_pymavlink(
+    receiver: TelemetrySocket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(receiver._codec, "parse", lambda _: pytest.fail("parsed"))
     state = [0.1] * 6
     datagram = Codec(5, 1).pack(
         dialect.MAVLink_attitude_message(1, *state),
@@ -155,14 +159,14 @@ def test_what_comes_again_and_again_does_not_need_pymavlink(ear: Ear, monkeypatc
         dialect.MAVLink_vfr_hud_message(30.0, 30.0, 90, 50, 1000.0, 0.0),
         dialect.MAVLink_servo_output_raw_message(1000, 0, 1500, 1500, 1500, 1200, 0, 0, 0, 0),
     )
-    assert [told.system for told in ear.read(datagram)] == [5] * 10
+    assert [told.system for told in receiver.parse(datagram)] == [5] * 10
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_a_display_that_is_not_finite_is_refused(ear: Ear, value: float) -> None:
+def test_a_display_that_is_not_finite_is_refused(receiver: TelemetrySocket, value: float) -> None:
     message = dialect.MAVLink_vfr_hud_message(30.0, value, 90, 50, 1000.0, 0.0)
     datagram = message.pack(dialect.MAVLink(None, 5, 1))
-    assert ear.read(datagram) == as_pymavlink_reads(datagram) == []
+    assert receiver.parse(datagram) == as_pymavlink_reads(datagram) == []
 
 
 def test_the_swarm_as_it_was_told(station: Monitor, pilot: socket.socket) -> None:
@@ -242,7 +246,7 @@ def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
             Codec(101, 25).pack(float_array(9, "truth", [1.0] * len(NAMES))), station._ear._socket.getsockname()
         )
         station.read()
-    assert station.strangers == 1
+    assert station.foreign_datagrams == 1
     assert station.snapshot().uavs == {}
     station.close()
     assert (tmp_path / "telemetry.tlog").read_bytes() == b""
@@ -257,7 +261,7 @@ def test_on_a_full_disk_the_log_ends_and_the_station_hears_on(pilot: socket.sock
     for n in range(200):
         pilot.send(codec.pack(float_array(10_000 * n, "truth", [1.0] * len(NAMES))))
         station.read()
-    assert station.take_trouble() == "telemetry is no longer logged: No space left on device"
-    assert station.take_trouble() == ""
+    assert station.take_log_error() == "the telemetry is not logged any further: No space left on device"
+    assert station.take_log_error() == ""
     assert station.t == pytest.approx(1.99)
     station.close()

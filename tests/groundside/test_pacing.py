@@ -20,7 +20,7 @@ def said(pacing: Pacing, seconds: int, factor: float, late_share: float = 0.0) -
     for n in range(seconds):
         t = factor * n
         ticks = round(800 * t)
-        texts.append(pacing.look(100.0 + n, t, (round(late_share * ticks), ticks), OWN, []))  # type: ignore[arg-type]
+        texts.append(pacing.measure(100.0 + n, t, (round(late_share * ticks), ticks), OWN, []))  # type: ignore[arg-type]
     return [text for text in texts if text]
 
 
@@ -41,7 +41,7 @@ def test_a_swarm_in_lockstep_that_falls_short_says_so_once() -> None:
 
 def test_as_fast_as_possible_is_never_too_slow() -> None:
     pacing = Pacing(SETUP, lockstep=True)
-    pacing.ask(float("inf"))
+    pacing.set_speed(float("inf"))
     assert said(pacing, 20, 0.4) == []
     assert pacing.pace.asked is None
 
@@ -64,6 +64,6 @@ def test_after_a_pause_nothing_of_before_counts() -> None:
 def test_the_steps_in_which_time_is_told_do_not_look_like_a_slow_computer() -> None:
     """A twentieth of real time: news of 0.1 s come every two seconds, with a delay."""
     pacing = Pacing(replace(SETUP, asked=0.05), lockstep=True)
-    texts = [pacing.look(100.0 + n, 0.1 * ((n - 1) // 2), (0, 80), OWN, []) for n in range(1, 90)]
+    texts = [pacing.measure(100.0 + n, 0.1 * ((n - 1) // 2), (0, 80), OWN, []) for n in range(1, 90)]
     assert [text for text in texts if text] == []
     assert pacing.pace.factor == pytest.approx(0.05, rel=0.1)

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.swarm.registry import Control, Entry, ask_swarm, find_swarm
+from ftcc.groundside.swarm.registry import ControlSocket, Entry, ask_swarm, find_swarm
 from ftcc.link.ports import runtime_folder
 
 
@@ -26,14 +26,14 @@ def steps(command: str, arguments: dict[str, Any]) -> int:
 
 
 @pytest.fixture
-def control(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Control]:
+def control(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ControlSocket]:
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path))
     entry = Entry("bench", os.getpid(), "containment", str(tmp_path), (), None, (0, 0), None, 0.0)
-    with closing(Control(entry, steps)) as one:
+    with closing(ControlSocket(entry, steps)) as one:
         yield one
 
 
-def said(control: Control, line: bytes) -> dict[str, Any]:
+def said(control: ControlSocket, line: bytes) -> dict[str, Any]:
     """What the swarm answers to a line."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.settimeout(5.0)
@@ -62,20 +62,20 @@ def said(control: Control, line: bytes) -> dict[str, Any]:
         b"\xff\xfe",
     ],
 )
-def test_nonsense_is_refused_and_the_next_caller_is_answered(control: Control, line: bytes) -> None:
+def test_nonsense_is_refused_and_the_next_caller_is_answered(control: ControlSocket, line: bytes) -> None:
     refused = said(control, line)
     assert not refused["ok"]
     assert refused["error"]
     assert said(control, b'{"command": "step", "ticks": 3}') == {"ok": True, "value": 3}
 
 
-def serve_once(control: Control) -> None:
+def serve_once(control: ControlSocket) -> None:
     """Answer the next caller."""
     select.select([control], [], [], 5.0)
     control.serve()
 
 
-def test_a_swarm_is_found_and_told(control: Control) -> None:
+def test_a_swarm_is_found_and_told(control: ControlSocket) -> None:
     server = threading.Thread(target=serve_once, args=(control,))
     server.start()
     assert ask_swarm(find_swarm(None), "step", ticks=5) == 5

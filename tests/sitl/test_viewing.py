@@ -151,7 +151,7 @@ def test_who_watches_late_sees_the_past_and_the_run_stays_whole(fly: Callable[..
     drawn: list[Snapshot] = []
 
     class Board:
-        def log(self, snapshot: Snapshot, patience: float) -> None:
+        def log(self, snapshot: Snapshot, timeout: float) -> None:
             drawn.append(snapshot)
 
         def take_problems(self) -> tuple[Event, ...]:

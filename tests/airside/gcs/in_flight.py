@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ftcc.groundside.swarm.registry import Card, Entry
+from ftcc.groundside.swarm.registry import Entry, VehicleEntry
 from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import dialect
 from ftcc.link.gate import EventReport
@@ -30,7 +30,7 @@ def flying(
     with closing(Bench(tmp_path, 1000, neighbours=heard, uav=uav, **setting)) as alone, alone as bench:
         bench.answer(0, LEVEL, np.zeros(4))
         role = "follower" if uav == 1 else "leader"
-        card = Card(uav, uav, role, bench.block.of(uav).ground, heard)
+        card = VehicleEntry(uav, uav, role, bench.block.of(uav).ground, heard)
         entry = Entry("bench", 1, "containment", str(tmp_path), (card,), None, (0, 0), None, 0.0)
         key = setting.get("key")
         with Station(entry, timeout=0.3, tries=2, key=key) as station:

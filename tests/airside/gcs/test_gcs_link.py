@@ -17,7 +17,7 @@ from ftcc.airside.gcs.requests import MESSAGES
 from ftcc.airside.gcs.streams import STREAMS
 from ftcc.airside.schemes import find
 from ftcc.groundside.swarm.conversation import NoAnswerError, RefusedError
-from ftcc.groundside.swarm.registry import Card, Entry
+from ftcc.groundside.swarm.registry import Entry, VehicleEntry
 from ftcc.groundside.swarm.station import Station
 from ftcc.link.codec import Codec
 from ftcc.link.failures import failure_answer, read_failure
@@ -389,7 +389,7 @@ def test_valid_messages_with_any_contents_are_survived(bench, station):
 def test_before_the_first_state_it_answers_too(tmp_path, monkeypatch):
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path / "runtime"))
     with closing(Bench(tmp_path, 9)) as alone, alone as bench:
-        card = Card(1, 1, "follower", bench.block.of(1).ground, ())
+        card = VehicleEntry(1, 1, "follower", bench.block.of(1).ground, ())
         with Station(Entry("bench", 1, "", "", (card,), None, (0, 0), None, 0.0), timeout=0.5) as station:
             assert station.state(1).t == 0.0
         bench.vehicle.send(*state_messages(0, LEVEL, np.zeros(4)))

@@ -6,7 +6,7 @@ import math
 
 from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 
-__all__ = ["faults", "faulty", "in_trouble", "is_silent", "label", "name", "silent_since"]
+__all__ = ["describe_faults", "describe_silence", "faulty_actuators", "in_trouble", "is_silent", "label", "name"]
 
 _SILENT = 1.0
 """Age of a UAV's telemetry from which it counts as silent, s; of wall time where it flies faster than that."""
@@ -23,26 +23,27 @@ def label(uav: int, leads: bool, snapshot: Snapshot) -> str:
     state = snapshot.uavs.get(uav)
     if state is None:
         return f"{called}: not heard"
-    broken = len(faulty(state))
-    trouble = silent_since(state, snapshot) or (f"{broken} faults" if broken > 1 else faults(state))
+    broken = len(faulty_actuators(state))
+    trouble = describe_silence(state, snapshot) or (f"{broken} faults" if broken > 1 else describe_faults(state))
     return f"{called}: {trouble}" if trouble else called
 
 
-def faults(uav: UavState) -> str:
+def describe_faults(uav: UavState) -> str:
     """The actuators that do not act as commanded, in words; empty if all do. The bias is told of a single one."""
-    words = [f"{actuator.replace('_', ' ')} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in faulty(uav)]
+    broken = faulty_actuators(uav)
+    words = [f"{actuator.replace('_', ' ')} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in broken]
     if len(words) == 1:
-        bias = uav.bias.get(faulty(uav)[0], 0.0)
+        bias = uav.bias.get(broken[0], 0.0)
         return words[0] + (f" {bias:+.2g}" if bias else "")
     return ", ".join(words)
 
 
-def faulty(uav: UavState) -> list[str]:
+def faulty_actuators(uav: UavState) -> list[str]:
     """Names of the actuators that do not act as commanded."""
     return [name for name, left in uav.effectiveness.items() if left != 1.0 or uav.bias.get(name, 0.0) != 0.0]
 
 
-def silent_since(uav: UavState, snapshot: Snapshot) -> str:
+def describe_silence(uav: UavState, snapshot: Snapshot) -> str:
     """That a UAV has fallen silent; empty if it has not."""
     return f"silent since {uav.t:.0f} s" if is_silent(uav, snapshot) else ""
 
@@ -67,4 +68,4 @@ def _fastest(pace: Pace | None) -> float:
 
 def in_trouble(uav: UavState, snapshot: Snapshot) -> bool:
     """Whether something is wrong with a UAV: a fault of an actuator, or silence."""
-    return is_silent(uav, snapshot) or bool(faulty(uav))
+    return is_silent(uav, snapshot) or bool(faulty_actuators(uav))
