@@ -1,4 +1,4 @@
-"""The live dashboard in Rerun: snapshots of the swarm, and what is drawn of them; a recorded run again."""
+"""Draw snapshots of a swarm in Rerun, live or from a recorded run."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Everything that a dashboard draws, in one place: the swarm in space, its curves, its table, its events."""
+"""Combine everything that a dashboard draws: the swarm in space, its curves, its table, its events."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Artists"]
 
 
 class Artists:
-    """Turns snapshots into what is logged. The first one tells how large the swarm is."""
+    """Turns snapshots into Rerun entries. The first snapshot sets the scale of the scene."""
 
     def __init__(self, subject: Subject, first: Snapshot) -> None:
         self._pace = PaceCurve() if first.pace is not None else None
@@ -29,13 +29,13 @@ class Artists:
         self._table = Table(subject, self._detail)
 
     def static(self) -> list[Entry]:
-        """What is logged once, the blueprint first."""
+        """Return the entries that are logged once, the blueprint first."""
         attitudes = self._attitudes.static() if self._attitudes is not None else []
         pace = self._pace.static() if self._pace is not None else []
         return [self._layout(), *self._scene.static(), *attitudes, *self._plots.static(), *pace]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """One instant, and what happened before it."""
+        """Return the entries of one snapshot and its events."""
         new = self._detail.update(snapshot)
         entries = [*self._scene.draw(snapshot, new), *self._plots.draw(snapshot, new), *self._table.draw(snapshot)]
         if self._attitudes is not None:
@@ -43,7 +43,7 @@ class Artists:
         return entries + self._draw_pace(snapshot) + event_entries(snapshot.events)
 
     def _draw_pace(self, snapshot: Snapshot) -> list[Entry]:
-        """Times real time; its plot joins the layout when the first pace is told, for a recorded run tells none."""
+        """Draw the pace; its plot joins the layout with the first measurement, which a recorded run does not have."""
         if self._pace is not None:
             return self._pace.draw(snapshot)
         if snapshot.pace is None:

@@ -1,4 +1,4 @@
-"""How the aircraft lie in the air: side by side, each seen along its own course, its reference as an outline."""
+"""Draw the attitudes of all aircraft side by side, each seen along its own course, with its reference as an outline."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from ftcc.link.rotation import body_axes
 __all__ = ["Attitudes"]
 
 _SPACING, _RISE = 1.4 * SPAN, 0.7 * SPAN
-"""Between aircraft of a row, and from row to row, m."""
+"""Distance between aircraft of a row, and between rows, m."""
 _RISE_CROWDED = 1.0 * SPAN
-"""From row to row in a big swarm, where labels are large beside the aircraft, m."""
+"""Distance between rows in a big swarm, where labels are large compared with the aircraft, m."""
 _REFERENCES = {"mu": "mu_d", "alpha": "alpha_d", "beta": "beta_d"}
-"""Signals that say how a UAV should lie in the air, by the true state that they stand for."""
+"""Signals that are attitude references, by the true state that they refer to."""
 
 
 class Attitudes:
-    """Draws the true attitude of every aircraft with its course turned ahead, away from who looks.
+    """Draws the true attitude of every aircraft, with its course pointing away from the viewer.
 
-    Where aircraft turn away from each other their places soon tell nothing; their attitudes are what they agree on. The
-    places here are slots, and not true. Each slot is turned as its line of sight is, so that equal attitudes look
-    equal: all are seen as from straight behind them.
+    In attitude schemes aircraft may fly apart, so that their positions show little; what they agree on is attitude.
+    Here each aircraft stands in a slot, not at its true position. Each slot is rotated with its line of sight, so that
+    every aircraft is seen from straight behind and equal attitudes look equal.
     """
 
     title = "Attitudes, each along its own course (outlines: references; places are slots)"
@@ -46,7 +46,7 @@ class Attitudes:
         self._leaders = set(subject.leaders)
         rise = _RISE_CROWDED if detail.crowded else _RISE
         self._above = 0.45 * rise if detail.crowded else 0.3 * SPAN
-        """Height of a label over its aircraft, m."""
+        """Height of a label above its aircraft, m."""
         rows = math.ceil(math.sqrt(0.5 * len(self._uavs)))
         columns = math.ceil(len(self._uavs) / rows)
         self._slots = {
@@ -60,12 +60,12 @@ class Attitudes:
         self._poses = Poses()
         self._labels: dict[int, str] = {}
         self._outlined: set[int] = set()
-        """Who has an outline."""
+        """UAVs that have an outline."""
         self._others: list[int] = []
-        """Who was drawn as a stick last."""
+        """UAVs drawn as sticks in the previous snapshot."""
 
     def view(self) -> rrb.Spatial3DView:
-        """The slots from behind, and a little above."""
+        """Return the view of the slots, from behind and slightly above."""
         return rrb.Spatial3DView(
             origin="/attitudes",
             name=self.title,
@@ -76,11 +76,11 @@ class Attitudes:
         )
 
     def static(self) -> list[Entry]:
-        """Shapes, colours, slots."""
+        """Return shapes, colours and slots."""
         return [Entry("/attitudes", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP), *self._shapes(self._detail.shown)]
 
     def _shapes(self, uavs: Iterable[int]) -> list[Entry]:
-        """What is drawn of UAVs in full."""
+        """Return the shapes of UAVs that are drawn in full."""
         entries = []
         vertices, normals = airframe(1.0)
         for uav in uavs:
@@ -92,7 +92,7 @@ class Attitudes:
         return entries
 
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
-        """Everything that moves; ``new`` are those that have just come into view."""
+        """Return everything that moves; ``new`` are the UAVs that are drawn in full from now on."""
         entries = self._shapes(new) + self._sticks(snapshot)
         for uav in self._detail.shown:
             text = label(uav, uav in self._leaders, snapshot)
@@ -115,7 +115,7 @@ class Attitudes:
         return entries
 
     def _draw_outline(self, uav: int) -> list[Entry]:
-        """The outline of a UAV that has a reference, when it is first told: before, it would have no place."""
+        """Return the outline of a UAV with its first reference; before, it would have no position."""
         if uav in self._outlined:
             return []
         self._outlined.add(uav)
@@ -123,7 +123,7 @@ class Attitudes:
         return [Entry(f"/attitudes/reference/{uav}", None, shape)]
 
     def _sticks(self, snapshot: Snapshot) -> list[Entry]:
-        """All who are not drawn in full, in one call."""
+        """Return all UAVs that are not drawn in full, as one entry."""
         if not self._detail.crowded:
             return []
         full = set(self._detail.shown)
@@ -141,7 +141,7 @@ class Attitudes:
 
 
 def _rotation_between(before: NDArray[np.float64], after: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """The shortest rotation from one direction to another, not its opposite, as a quaternion."""
+    """Return the shortest rotation from one direction to another, not opposite one, as a quaternion."""
     a, b = before / np.linalg.norm(before), after / np.linalg.norm(after)
     q = np.array([1.0 + a @ b, *np.cross(a, b)])
     w, x, y, z = (q / np.linalg.norm(q)).tolist()

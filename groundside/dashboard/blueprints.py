@@ -1,4 +1,4 @@
-"""How the views stand on the screen: left the swarm, below it the graph, the table and the events; right the curves."""
+"""Lay out the views: the swarm on the left, below it the graph, the table and the events; the curves on the right."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["blueprint"]
 
 _BESIDE = 4
-"""Plots below one another; more stand in two columns."""
+"""Largest number of plots in one column; more plots take two columns."""
 
 
 def blueprint(
     scene: Scene, attitudes: Attitudes | None, plots: Plots, table: Table, pace: PaceCurve | None
 ) -> rrb.Blueprint:
-    """The layout that goes into the viewer and into the recording."""
+    """Return the layout for the viewer and the recording."""
     swarm = scene.view()
     groups = plots.views()
     first = groups.pop("Tracking")
@@ -54,5 +54,5 @@ def blueprint(
 
 
 def _stack(views: list[rrb.View], name: str) -> rrb.Container:
-    """Plots below one another, or in two columns."""
+    """Stack plots in one column, or in two if they are many."""
     return rrb.Vertical(*views, name=name) if len(views) <= _BESIDE else rrb.Grid(*views, grid_columns=2, name=name)

@@ -1,7 +1,7 @@
-"""The live dashboard: what a swarm does, in Rerun, while it flies, and in its recording.
+"""Show a swarm in Rerun while it flies, and record what is shown.
 
-Everything is drawn at the simulated time of its snapshot (timeline ``t``). A blueprint goes with it, into the viewer
-and into the recording, so that there is nothing to set up.
+Everything is drawn at the simulated time of its snapshot (timeline ``t``). The viewer and the recording include a
+blueprint, so that users have nothing to set up.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ __all__ = ["Dashboard"]
 
 _APPLICATION = "ftcc"
 _TO_VIEWER = 1.0
-"""Longest wait of logged data in the process on their way to a viewer that lags, s; else they go frame by frame."""
+"""Longest time that data for a slow viewer are buffered, s; to a fast one they go frame by frame."""
 _TO_FILE = 2.0
-"""Longest wait of logged data on their way to the recording, s: what a killed run loses.
+"""Longest time that data for the recording are buffered, s; a killed run loses them.
 
-Few large pieces make a small file and a small index of it, which stays in memory until the file is closed.
+Few large chunks make a small file and a small index, which stays in memory until the file is closed.
 """
 
 
 class Dashboard:
-    """Draws snapshots in a viewer, in a recording, in both or nowhere.
+    """Draws snapshots in a viewer, in a recording, in both or in neither.
 
-    Neither a viewer that is slow, dies or never starts nor its absence costs the caller more than the drawing itself.
-    Loads rerun, which starts threads: create it after the last fork, in a thread that lives as long as the process.
+    A viewer that is slow, dies or never starts does not delay the caller. Loads rerun, which starts threads: create a
+    dashboard after the last fork, in a thread that lives as long as the process.
 
     Parameters
     ----------
     subject : Subject
-        What is shown.
+        The swarm to show.
     recording : Path, optional
-        Where the recording (.rrd) goes.
+        File of the recording (.rrd).
     viewer : "web", "native" or "none"
     ports : (int, int), optional
-        Of the viewer's data and of its page; free ones if None.
+        Ports of the viewer's data and of its page; free ports if None.
     open_browser : bool
-        Whether ``web`` opens the user's browser, where there is a screen.
+        Whether ``web`` opens the user's browser, if there is a screen.
     """
 
     address: str | None
-    """Of the page to open, None without one."""
+    """Address of the page to open; None if there is no page."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class Dashboard:
             self.address = self._viewer.address
 
     def log(self, snapshot: Snapshot, timeout: float = 0.0) -> None:
-        """Draw ``snapshot``; waits for a viewer that lags for ``timeout`` (wall s) at most."""
+        """Draw ``snapshot``; wait at most ``timeout`` (wall s) for a viewer that is behind."""
         if self._recording is None and self._viewer is None:
             return
         self._t = snapshot.t
@@ -99,17 +99,17 @@ class Dashboard:
             write(self._recording, entries)
 
     def take_problems(self) -> tuple[Event, ...]:
-        """What went wrong with the dashboard itself since the last call, each once; it is in the event log, too."""
+        """Return the dashboard's own problems since the last call, each once; they are also in the event log."""
         problems, self._problems = self._problems, []
         return tuple(Event(self._t, "warning", problem) for problem in problems)
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of the viewer, if this process has started one."""
+        """Return the process ids of the viewer, if this process started one."""
         return [] if self._viewer is None else self._viewer.pids
 
     def wait(self) -> None:
-        """Wait until the viewer ends; returns at once without one."""
+        """Wait until the viewer ends; return at once if there is none."""
         if self._viewer is not None:
             self._viewer.wait()
 
@@ -128,7 +128,7 @@ class Dashboard:
             self._viewer = None
 
     def _own_events(self) -> list[Entry]:
-        """The dashboard's own trouble, for its event log."""
+        """Return the dashboard's new problems as entries of the event log."""
         from ftcc.groundside.dashboard.table import event_entries
 
         problem = self._viewer.take_problem() if self._viewer is not None else None
@@ -138,7 +138,7 @@ class Dashboard:
         return event_entries([Event(self._t, "warning", problem)])
 
     def _stream(self, hold: float) -> rr.RecordingStream:
-        """A stream of this flight; all of them are one recording to Rerun."""
+        """Return a new stream; Rerun treats all streams of this dashboard as one recording."""
         import rerun as rr
 
         batches = rr.ChunkBatcherConfig(flush_tick=hold)
@@ -162,7 +162,7 @@ class Dashboard:
 
 
 def _load_rerun() -> None:
-    """Import rerun; its messages about viewers are ours to give, and would disturb the terminal."""
+    """Import rerun without its messages about viewers, which the dashboard reports itself."""
     wanted = os.environ.get("RUST_LOG")
     os.environ.setdefault("RUST_LOG", "error,re_grpc_client=off,re_sdk=off,re_quota_channel=off")
     import rerun  # noqa: F401

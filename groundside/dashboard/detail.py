@@ -1,16 +1,14 @@
-"""How much is drawn of a swarm: all of a small one in full, of a big one a few aircraft in full and the others as one.
+"""Choose the level of detail: a small swarm is drawn in full, of a big one only a few aircraft.
 
-The levels of detail, in one place:
+- **Up to `FULL` UAVs**, every aircraft is drawn in full: its body in its attitude, trail, reference, label, edges, and
+  a curve in every plot.
+- **Above**, at most `FULL` aircraft are drawn in full: a few followers and leaders from the start, and up to `TROUBLED`
+  more when they have an actuator fault or fall silent. Such an aircraft stays, repaired or not, so that its curves
+  continue. One call draws all others, as sticks in their positions and attitudes. Plots show the lowest and the highest
+  value of all UAVs. Edges between the others are drawn only while they are stale or cut. The table has a summary and
+  a row for each UAV in trouble.
 
-- **Up to `FULL` UAVs** every aircraft is drawn in full: its body in its attitude, trail, reference, label, edges, and a
-  curve in every plot.
-- **Beyond**, at most `FULL` are: a few followers and leaders from the beginning on, and `TROUBLED` more as they get
-  into trouble, which is a fault of an actuator or silence. Who has come into view stays there, repaired or not, so that
-  a curve goes on. The others are drawn together, as sticks in their places and attitudes, by one call for all of them;
-  plots show how far they reach, from the lowest to the highest; edges among them are drawn while they bring no news;
-  the table sums them up and tells of those in trouble.
-
-So the calls that make a picture do not grow with the swarm, only the arrays in them.
+So the number of calls per snapshot does not grow with the swarm; only the arrays do.
 """
 
 from __future__ import annotations
@@ -22,33 +20,33 @@ from ftcc.groundside.dashboard.subject import Subject
 __all__ = ["FULL", "Detail"]
 
 FULL = 16
-"""Aircraft that are drawn in full, at most."""
+"""Largest number of aircraft drawn in full."""
 TROUBLED = 8
-"""Room among these, in a big swarm, for aircraft that get into trouble."""
+"""Part of these that a big swarm keeps for aircraft that get into trouble."""
 _LEADERS = 4
-"""Leaders among the others, at most."""
+"""Largest number of leaders that a big swarm draws in full from the start."""
 
 
 class Detail:
-    """Who of a swarm is drawn in full."""
+    """The UAVs of a swarm that are drawn in full."""
 
     def __init__(self, subject: Subject) -> None:
         uavs = sorted(subject.graph.uavs)
         self.crowded = len(uavs) > FULL
-        """Whether there are others, who are drawn together."""
+        """Whether the swarm is big, so that some UAVs are not drawn in full."""
         self.shown: list[int] = uavs
-        """Who is drawn in full, in the order in which they came into view."""
+        """UAVs drawn in full, in the order in which they were added."""
         self.capacity = FULL if self.crowded else len(uavs)
-        """How many there may be."""
+        """Largest length of ``shown``."""
         if self.crowded:
             leaders = subject.leaders[:_LEADERS]
-            room, followers = FULL - TROUBLED - len(leaders), subject.followers
-            spread = {len(followers) * i // room for i in range(room)}
+            count, followers = FULL - TROUBLED - len(leaders), subject.followers
+            spread = {len(followers) * i // count for i in range(count)}
             self.shown = sorted([*(uav for i, uav in enumerate(followers) if i in spread), *leaders])
         self._others = set(uavs) - set(self.shown)
 
     def update(self, snapshot: Snapshot) -> list[int]:
-        """Take UAVs into view that have got into trouble, as long as there is room; those that are new."""
+        """Add UAVs that have got into trouble while there is room, and return the added ones."""
         new: list[int] = []
         if not self.crowded or len(self.shown) >= self.capacity:
             return new

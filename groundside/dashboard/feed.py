@@ -1,7 +1,7 @@
-"""What a station knows, for whoever watches: snapshots over a socket of this machine, a JSON object a line.
+"""Send snapshots to watchers over a Unix socket, one JSON object per line.
 
-A watcher that is slow misses snapshots, not events; one that dies is forgotten; without any who takes one, nothing is
-even encoded. A line has some 1.7 kB a UAV.
+A slow watcher misses snapshots but no events; one that dies is removed; without watchers nothing is encoded. A line has
+about 1.7 kB per UAV.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ __all__ = ["Feed", "decode", "encode", "feed_path", "watch_swarm"]
 
 
 def feed_path(name: str) -> Path:
-    """Socket of the swarm called ``name``."""
+    """Return the socket path of the swarm called ``name``."""
     return runtime_folder() / f"{name}.feed"
 
 
 def encode(snapshot: Snapshot) -> bytes:
-    """A snapshot as a line."""
-    # Its dataclasses are data by their fields, without the copies that `asdict` makes of everything in them.
+    """Encode a snapshot as one line of JSON."""
+    # `vars` instead of `asdict`, which would copy everything in the dataclasses.
     return json.dumps(snapshot, default=vars, separators=(",", ":")).encode() + b"\n"
 
 
 def decode(line: bytes) -> Snapshot:
-    """The inverse of `encode`.
+    """Decode a line that `encode` has made.
 
     Raises
     ------
     ValueError
-        If it is no snapshot.
+        If the line is no snapshot.
     """
     try:
         data = json.loads(line)
@@ -57,13 +57,13 @@ def _state(data: Mapping[str, Any]) -> UavState:
 class _Watcher:
     link: socket.socket
     pending: bytes = b""
-    """What has not been sent yet of the last line."""
+    """Part of the last line that has not been sent yet."""
     missed: tuple[Event, ...] = ()
-    """Events of the snapshots that this watcher did not get."""
+    """Events of the snapshots that this watcher missed."""
 
 
 class Feed:
-    """The station's end."""
+    """The sender of a swarm's snapshots."""
 
     def __init__(self, name: str) -> None:
         self._path = feed_path(name)
@@ -75,7 +75,7 @@ class Feed:
         self._watchers: list[_Watcher] = []
 
     def offer(self, snapshot: Snapshot) -> None:
-        """Send ``snapshot`` to all who watch and keep up; returns at once."""
+        """Send ``snapshot`` to all watchers that keep up, without waiting."""
         with contextlib.suppress(BlockingIOError):
             link, _ = self._server.accept()
             link.setblocking(False)
@@ -96,19 +96,19 @@ class Feed:
                 self._watchers.remove(watcher)
 
     def _keeps_up(self, watcher: _Watcher) -> bool:
-        """Whether a watcher has taken all of the last line."""
+        """Return whether a watcher has received all of the last line."""
         if watcher.pending:
             self._send(watcher, watcher.pending)
         return not watcher.pending
 
     def _send(self, watcher: _Watcher, line: bytes) -> None:
-        """Send as much of a line as the watcher takes now; the rest is pending."""
+        """Send as much of a line as the socket accepts now, and keep the rest pending."""
         watcher.pending = line
         with contextlib.suppress(BlockingIOError):
             watcher.pending = line[watcher.link.send(line) :]
 
     def close(self) -> None:
-        """Let everybody go."""
+        """Disconnect all watchers and remove the socket."""
         for watcher in self._watchers:
             watcher.link.close()
         self._server.close()
@@ -116,12 +116,12 @@ class Feed:
 
 
 def watch_swarm(name: str) -> Iterator[Snapshot]:
-    """The snapshots of a running swarm from now on, until it ends.
+    """Yield the snapshots of a running swarm from now on, until it ends.
 
     Raises
     ------
     OSError
-        If it cannot be reached.
+        If the swarm cannot be reached.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.connect(str(feed_path(name)))

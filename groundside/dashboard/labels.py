@@ -1,4 +1,4 @@
-"""How a UAV and its state are put into words, the same in all views."""
+"""Name UAVs and describe their state in words, the same in all views."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 __all__ = ["describe_faults", "describe_silence", "faulty_actuators", "in_trouble", "is_silent", "label", "name"]
 
 _SILENT = 1.0
-"""Age of a UAV's telemetry from which it counts as silent, s; of wall time where it flies faster than that."""
+"""Age of a UAV's telemetry from which it counts as silent, s; wall time if it flies faster than real time."""
 
 
 def name(uav: int) -> str:
-    """What a UAV is called everywhere."""
+    """Return the name of a UAV."""
     return f"UAV {uav}"
 
 
 def label(uav: int, leads: bool, snapshot: Snapshot) -> str:
-    """What is written at an aircraft: its name, and what is wrong with it."""
+    """Return the label of an aircraft: its name, and its faults or silence."""
     called = name(uav) + (" leader" if leads else "")
     state = snapshot.uavs.get(uav)
     if state is None:
-        return f"{called}: not heard"
+        return f"{called}: no telemetry"
     broken = len(faulty_actuators(state))
     trouble = describe_silence(state, snapshot) or (f"{broken} faults" if broken > 1 else describe_faults(state))
     return f"{called}: {trouble}" if trouble else called
 
 
 def describe_faults(uav: UavState) -> str:
-    """The actuators that do not act as commanded, in words; empty if all do. The bias is told of a single one."""
+    """Describe the faulty actuators; empty if there are none. A bias is given only if one actuator is faulty."""
     broken = faulty_actuators(uav)
     words = [f"{actuator.replace('_', ' ')} {100.0 * uav.effectiveness[actuator]:.0f} %" for actuator in broken]
     if len(words) == 1:
@@ -39,26 +39,26 @@ def describe_faults(uav: UavState) -> str:
 
 
 def faulty_actuators(uav: UavState) -> list[str]:
-    """Names of the actuators that do not act as commanded."""
+    """Return the names of the actuators that do not act as commanded."""
     return [name for name, left in uav.effectiveness.items() if left != 1.0 or uav.bias.get(name, 0.0) != 0.0]
 
 
 def describe_silence(uav: UavState, snapshot: Snapshot) -> str:
-    """That a UAV has fallen silent; empty if it has not."""
+    """Describe since when a UAV has been silent; empty if it is not."""
     return f"silent since {uav.t:.0f} s" if is_silent(uav, snapshot) else ""
 
 
 def is_silent(uav: UavState, snapshot: Snapshot) -> bool:
-    """Whether a UAV has fallen silent.
+    """Return whether a UAV has fallen silent.
 
-    Telemetry comes ten times a second of wall time at most, so that in a fast swarm it is older in simulated time.
+    Telemetry arrives at most ten times per second of wall time, so that in a fast swarm it is older in simulated time.
     """
     age = snapshot.t - uav.t
     return age > _SILENT and age > _SILENT * _fastest(snapshot.pace)
 
 
 def _fastest(pace: Pace | None) -> float:
-    """How many times real time the swarm may be flying."""
+    """Return the largest pace at which the swarm may be flying, times real time."""
     if pace is None:
         return 1.0
     if pace.asked is None:
@@ -67,5 +67,5 @@ def _fastest(pace: Pace | None) -> float:
 
 
 def in_trouble(uav: UavState, snapshot: Snapshot) -> bool:
-    """Whether something is wrong with a UAV: a fault of an actuator, or silence."""
+    """Return whether a UAV has an actuator fault or is silent."""
     return is_silent(uav, snapshot) or bool(faulty_actuators(uav))

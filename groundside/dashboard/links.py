@@ -1,4 +1,4 @@
-"""The communication graph: arrows from whom is heard to who hears, coloured by what comes through."""
+"""Draw the communication graph: arrows from sender to receiver, coloured by the state of the link."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ __all__ = ["Links"]
 
 _FRESH, _STALE, _CUT = range(3)
 _TINTS = np.array([FRESH, STALE, CUT], np.uint8)
-"""What comes through an edge, the better the lower, and its colour."""
+"""States of an edge, the best first, and their colours."""
 _NOTES = 8
-"""Notes in the layout of a big swarm."""
+"""Largest number of notes in the graph of a big swarm."""
 _NOTE_OFFSET = 0.2
 """Distance of a note from its arrow; the circle of followers has radius 1."""
 _LOSSY = 0.01
-"""Share of lost records from which it is written at an edge."""
+"""Share of lost records from which an edge has a note."""
 _LOSS_MEMORY = 20.0
-"""Memory of the loss that is written, in snapshots: it follows changes within seconds."""
+"""Time constant over which the loss is averaged, in snapshots; it follows changes within seconds."""
 
 
 class Links:
-    """Draws the edges among the aircraft and in a layout of their own."""
+    """Draws the edges between the aircraft, and as a graph in a view of its own."""
 
     def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
@@ -55,20 +55,20 @@ class Links:
         self._layout_notes = (
             self._layout_origins + 0.62 * self._layout_vectors + _NOTE_OFFSET * np.column_stack((y, -x))
         )
-        """Nearer to who hears, and beside the arrow: those of the two directions stand apart."""
+        """Positions of notes, near the receiver and beside the arrow, so that both directions do not overlap."""
         self._all = np.arange(len(self._edges))
         self._states = np.full(len(self._edges), -1)
-        """What comes through each edge, as an index of `_TINTS`; as drawn last."""
+        """State of each edge in the previous snapshot, as an index of `_TINTS`."""
         self._drawn: NDArray[np.intp] = np.zeros(0, np.intp)
-        """Edges that are drawn among the aircraft."""
+        """Edges drawn between the aircraft."""
         self._notes: dict[int, str] | None = None
-        """What is written at edges; None: nothing has been drawn yet."""
+        """Notes by edge; None before the first snapshot."""
         self._counted = np.zeros((len(self._edges), 2))
         self._recent = np.zeros((len(self._edges), 2))
-        """Records received and lost of late, of each edge."""
+        """Records received and lost on each edge, averaged over `_LOSS_MEMORY`."""
 
     def view(self) -> rrb.Spatial2DView:
-        """Who hears whom."""
+        """Return the view of the graph."""
         return rrb.Spatial2DView(
             origin="/graph",
             name="Links (amber stale, red cut; age, share lost)",
@@ -76,7 +76,7 @@ class Links:
         )
 
     def static(self) -> list[Entry]:
-        """The layout: who stands where."""
+        """Return the nodes and arrows of the graph."""
         tints = colors(self._uavs)
         crowded = self._detail.crowded
         names = {} if crowded else {"labels": [self._name(uav) for uav in self._uavs], "show_labels": True}
@@ -94,7 +94,7 @@ class Links:
         return entries
 
     def draw(self, snapshot: Snapshot, positions: NDArray[np.float64], gap: float) -> list[Entry]:
-        """The edges between aircraft at ``positions`` (n, 3), ``gap`` away from them, and their state in the layout."""
+        """Return the edges between aircraft at ``positions`` (n, 3), ``gap`` (m) away from them, and in the graph."""
         if not self._edges:
             return []
         t = snapshot.t
@@ -120,19 +120,19 @@ class Links:
         return _FRESH if link is not None and link.age <= self._subject.stale_after else _STALE
 
     def _style(self, states: NDArray[np.int_]) -> tuple[NDArray[np.uint8], rr.components.RadiusBatch]:
-        """Colours and widths of edges."""
+        """Return colours and widths of edges."""
         thin = 0.5 if self._detail.crowded else 1.0
         return _TINTS[states], rr.Radius.ui_points(np.where(states == _FRESH, thin, 2.0))
 
     def _visible_edges(self, states: NDArray[np.int_]) -> NDArray[np.intp]:
-        """Edges that are drawn among the aircraft: in a big swarm those of the ones in full, and those without news."""
+        """Return the edges to draw between aircraft: in a big swarm those of UAVs in full, and stale or cut ones."""
         if not self._detail.crowded:
             return self._all
         full = np.isin(self._uavs, self._detail.shown)
         return np.flatnonzero(full[self._ends].all(axis=1) | (states != _FRESH))
 
     def _draw_notes(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
-        """What is wrong with edges; in a big swarm at one edge to a receiver, and at `_NOTES` at most."""
+        """Return notes at stale, cut and lossy edges; in a big swarm one per receiver, and at most `_NOTES`."""
         loss = self._loss(links)
         notes: dict[int, str] = {}
         receivers: set[int] = set()
@@ -161,7 +161,7 @@ class Links:
         return [Entry("/graph/notes", snapshot.t, texts)]
 
     def _draw_names(self) -> list[Entry]:
-        """Names in the layout of a big swarm: of those who are drawn in full."""
+        """Return the names in the graph of a big swarm: those of UAVs drawn in full."""
         if not self._detail.crowded or self._named == self._detail.shown:
             return []
         self._named = list(self._detail.shown)
@@ -180,7 +180,7 @@ class Links:
         return f"UAV {uav}" + (" leader" if uav in self._subject.leaders else "")
 
     def _loss(self, links: list[LinkState | None]) -> NDArray[np.float64]:
-        """Share of the records of each edge that were lost of late."""
+        """Return the recent share of lost records of each edge."""
         now = np.array([(link.received, link.lost) if link is not None else (0, 0) for link in links], float)
         self._recent += np.maximum(now - self._counted, 0.0) - self._recent / _LOSS_MEMORY
         self._counted = now
@@ -195,22 +195,22 @@ def _link(uavs: Mapping[int, UavState], sender: int, receiver: int) -> LinkState
 
 
 def _receiver_silent(receiver: int, snapshot: Snapshot) -> bool:
-    """Whether a UAV that was heard tells no more, so that nobody knows what it hears."""
+    """Return whether a UAV that sent telemetry has fallen silent, so that the state of its links is unknown."""
     state = snapshot.uavs.get(receiver)
     return state is not None and bool(describe_silence(state, snapshot))
 
 
 def _note(link: LinkState | None, state: int, loss: float) -> str:
-    """What is wrong with an edge. Rounded, so that the text changes rarely."""
+    """Describe the problem of an edge, rounded so that the text changes rarely."""
     if state == _FRESH:
         return f"{10 * round(10.0 * loss)} %" if loss > 0.05 else "1 %"
     if link is None or math.isinf(link.age):
-        return "cut, never heard" if link is not None and link.cut else "not heard yet"
+        return "cut, none received" if link is not None and link.cut else "none received"
     return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s"
 
 
 def _layout(graph: Graph, leaders: set[int]) -> dict[int, tuple[float, float]]:
-    """Followers on a circle, leaders outside it near those who hear them; y is down."""
+    """Return positions in the graph: followers on a circle, leaders outside near their receivers; y is down."""
     ring = [uav for uav in sorted(graph.uavs) if uav not in leaders] or sorted(graph.uavs)
     angles = {uav: -0.5 * math.pi + 2.0 * math.pi * i / len(ring) for i, uav in enumerate(ring)}
     places = {uav: (math.cos(a), math.sin(a)) for uav, a in angles.items()}

@@ -1,4 +1,4 @@
-"""How fast the swarm flies on the wall clock: a line of text above the table of the swarm, and a curve."""
+"""Show how fast the swarm flies on the wall clock: a line of text above the table, and a curve."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["PaceCurve", "describe_pace"]
 _ENTITY = "/plots/pace"
 _REACHED: Color = (72, 126, 216)
 _AS_ASKED = 0.02
-"""Relative difference up to which the pace counts as the one that was asked for."""
+"""Relative difference up to which the requested pace counts as reached."""
 
 
 def describe_pace(pace: Pace) -> str:
-    """The pace in one line: "5.2 x real time (asked: 10): both cores busy, try --pack auto"."""
+    """Describe the pace in one line: "5.2 x real time (asked: 10): both cores busy, try --pack auto"."""
     reached = "-" if math.isnan(pace.factor) else f"{pace.factor:.2g}" if pace.factor < 10.0 else f"{pace.factor:.0f}"
     if pace.asked is None:
         asked = " (as fast as possible)"
@@ -34,19 +34,19 @@ def describe_pace(pace: Pace) -> str:
 
 
 class PaceCurve:
-    """Draws times real time, reached and asked for, as long as somebody measures them."""
+    """Draws the pace, reached and requested, in times real time."""
 
     def view(self) -> rrb.View:
-        """The curve."""
+        """Return the plot."""
         return time_series(_ENTITY, "Times real time (gray: asked)")
 
     def static(self) -> list[Entry]:
-        """Names and colours."""
+        """Return names and colours of the curves."""
         lines = rr.SeriesLines(names=["times real time", "asked"], colors=[_REACHED, GRAY], widths=[1.5, 1.0])
         return [Entry(_ENTITY, None, lines)]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """The pace of one instant."""
+        """Return the pace of one snapshot."""
         if snapshot.pace is None:
             return []
         asked = math.nan if snapshot.pace.asked is None else snapshot.pace.asked

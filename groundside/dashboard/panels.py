@@ -1,9 +1,9 @@
-"""Which curves a swarm is shown by: from what its scheme declares, so that a scheme of one's own is shown, too.
+"""Choose the plots of a swarm from the signals that its scheme declares, so that a user's own scheme is shown, too.
 
-An error is a signal with a bound, or one whose meaning says "error". An estimate is one whose meaning begins with
-"estimated disturbance", "estimated effect", "estimated lumped" or "unexplained"; where it is called NAME_hat and the
-vehicle tells the station the disturbance NAME, the true value is drawn with it. What a law adapts has a meaning that
-says "network", "adapted" or "weights".
+An error is a signal with a bound, or with "error" in its meaning. An estimate is a signal whose meaning begins with
+"estimated disturbance", "estimated effect", "estimated lumped" or "unexplained"; if its name is NAME_hat and the plant
+has a disturbance NAME, the true value is drawn with it. An adapted quantity has "network", "adapted" or "weights" in
+its meaning.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MOTION = {
     "attitude": ("mu", "alpha", "beta"),
     "fire": ("V", "z"),
 }
-"""True states that tell how the flight goes, by family."""
+"""True states that are plotted, by family."""
 _MEANINGS = {
     "z": ("Altitude", "m"),
     "V": ("Airspeed", "m/s"),
@@ -39,55 +39,55 @@ _MEANINGS = {
     "beta": ("Sideslip", "rad"),
 }
 _ANGLES = ("mu", "alpha", "chi")
-"""True states that are recorded within half a turn, and whose curves go on beyond it."""
+"""True states that are recorded modulo a turn, and whose curves are unwrapped."""
 _REFERENCES = ("_r", "_ref", "_d", "hat", "_hat", "_id")
-"""How the signal is called that says what a state should be, the nearest to the law first."""
+"""Suffixes of signals that are references of a state, the one closest to the law first."""
 _NO_LIMIT = 2.0 * math.pi
-"""Limits of angles beyond this stand for none, rad."""
+"""Limits of angles from this value mean no limit, rad."""
 _LONGEST = 38
-"""Characters of a title that half the room shows."""
+"""Longest title that fits half the width, characters."""
 _MOST = 6
-"""Panels in a group."""
+"""Largest number of panels in a group."""
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One plot: a curve per UAV, and what belongs to it."""
+    """One plot: a curve per UAV, with bounds, limits and references."""
 
     path: str
     title: str
     unit: str
     value: Where
     second: Where | None = None
-    """Drawn thin beside it."""
+    """Quantity drawn as a thin line beside it."""
     include_leaders: bool = False
-    """Leaders, too."""
+    """Whether leaders are drawn, too."""
     bound: float | str | None = None
-    """A constant, or the signal that bounds the value both ways."""
+    """Symmetric bound: a constant, or the name of a signal."""
     limits: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
-    """How to read it."""
+    """Hints in the title."""
     band: bool = False
-    """Shade what lies between the leaders."""
+    """Shade the range between the leaders."""
     obstacles: bool = False
     """Draw the top of the obstacle that any UAV is above."""
     angle: bool = False
-    """An angle: its curves go on where it jumps by a turn."""
+    """Whether the value is an angle, whose curves are unwrapped."""
     degrees: bool = False
-    """Show angles in degrees, as the chapters on attitude do."""
+    """Show angles in degrees, as the chapters on attitude control do."""
 
     @property
     def scale(self) -> float:
-        """From the recorded unit to the one that is shown."""
+        """Return the factor from the recorded to the shown unit."""
         return math.degrees(1.0) if self.degrees and self.unit.startswith("rad") else 1.0
 
     @property
     def shown_unit(self) -> str:
-        """Unit on the axis."""
+        """Return the unit on the axis."""
         return self.unit.replace("rad", "deg", 1) if self.degrees else self.unit
 
     def read(self, where: Where, state: UavState | None) -> float:
-        """A number of a UAV in the shown unit; nan if it is not known."""
+        """Return a value of a UAV in the shown unit; nan if it is unknown."""
         if state is None:
             return math.nan
         source, name = where
@@ -95,7 +95,7 @@ class Panel:
 
 
 def panels_of(subject: Subject) -> dict[str, list[Panel]]:
-    """The panels by group: "Tracking", "Commands", "Estimates", "Adaptation"; empty groups are left out."""
+    """Return the panels by group: "Tracking", "Commands", "Estimates", "Adaptation"; empty groups are left out."""
     groups = {
         "Tracking": [*_motion(subject), *_errors(subject)],
         "Commands": _commands(subject),
@@ -206,11 +206,11 @@ def _title(signal: Quantity) -> str:
         return signal.name
     title = f"{signal.meaning[0].upper()}{signal.meaning[1:]} {signal.name}"
     if len(title) > _LONGEST:
-        # What stands behind a comma tells which of several components it is, as the symbol does.
+        # The text after a comma names the component, as the symbol does.
         title = f"{title.partition(',')[0].removesuffix(signal.name).strip()} {signal.name}"
     return title
 
 
 def uavs_of(panel: Panel, subject: Subject) -> Sequence[int]:
-    """Whose curves a panel shows."""
+    """Return the UAVs whose curves a panel shows."""
     return sorted(subject.graph.uavs) if panel.include_leaders else subject.followers

@@ -1,4 +1,4 @@
-"""The swarm over time: a plot to a panel, a series to a UAV, so that a snapshot costs one call to the plot."""
+"""Plot the swarm over time: one plot per panel with a series per UAV, so that a snapshot costs one call per plot."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from ftcc.groundside.palette import GRAY, Color, colors
 __all__ = ["WINDOW", "Plots", "time_series"]
 
 WINDOW = 60.0
-"""Time that the plots show, s."""
+"""Time span of the plots, s."""
 
 _EXTREMES: Color = (158, 164, 172)
-"""Of curves that tell how far all UAVs of a big swarm reach."""
+"""Colour of the curves of the extremes of all UAVs of a big swarm."""
 
 Curve = tuple[str, Color, float]
 """Name, colour, width."""
@@ -40,17 +40,17 @@ class Plots:
         self._groups = panels_of(subject)
         self._panels = [panel for panels in self._groups.values() for panel in panels]
         self._angles: dict[tuple[str, int | None], float] = {}
-        """Where the curves of angles ended, by panel and UAV."""
+        """Latest values of unwrapped angles, by panel and UAV."""
         self._uavs, self._followers = self._curve_uavs(include_leaders=True), self._curve_uavs(include_leaders=False)
-        """Whose curves panels show, and whose of them that only followers have."""
+        """UAVs with curves in panels of all UAVs, and in panels of followers; None reserves a curve."""
 
     def views(self) -> dict[str, list[rrb.View]]:
-        """One view to a panel, by group."""
+        """Return one view per panel, by group."""
         pale = self._detail.crowded
         return {group: [_view(panel, pale) for panel in panels] for group, panels in self._groups.items()}
 
     def static(self) -> list[Entry]:
-        """Names, colours and widths of all series."""
+        """Return names, colours and widths of all series."""
         entries = []
         for panel in self._panels:
             names, tints, widths = zip(*self._curves(panel), strict=True)
@@ -58,7 +58,7 @@ class Plots:
         return entries
 
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
-        """The values of one instant; ``new`` are those that have just come into view."""
+        """Return the values of one snapshot; ``new`` are the UAVs that are drawn in full from now on."""
         t = snapshot.t
         entries: list[Entry] = []
         if new:
@@ -74,10 +74,10 @@ class Plots:
         return entries
 
     def _curves(self, panel: Panel) -> list[Curve]:
-        """What `_values` gives, in the same order."""
+        """Return the curves whose values `_values` returns, in the same order."""
         uavs = self._uavs if panel.include_leaders else self._followers
         leaders = self._leaders
-        # The farther a curve is behind in this list, the farther in front it is drawn.
+        # Later curves are drawn on top of earlier ones.
         curves = [("lowest of all", _EXTREMES, 1.0), ("highest of all", _EXTREMES, 1.0)] if self._detail.crowded else []
         curves += [self._curve(uav, "", 2.5 if uav in leaders else 1.5) for uav in uavs]
         if panel.second is not None:
@@ -95,7 +95,7 @@ class Plots:
         return curves
 
     def _curve(self, uav: int | None, what: str, width: float) -> Curve:
-        """A curve of a UAV, or one that is kept for whoever comes into view."""
+        """Return the curve of a UAV, or a reserved curve without a name."""
         return ("", GRAY, width) if uav is None else (name(uav) + what, self._colors[uav], width)
 
     def _values(self, panel: Panel, snapshot: Snapshot) -> list[float]:
@@ -125,7 +125,7 @@ class Plots:
         return values
 
     def _without_jump(self, panel: Panel, uav: int | None, value: float) -> float:
-        """An angle without the jump of a turn since the picture before; another value as it is."""
+        """Return an angle without a jump by a turn since the previous snapshot; other values unchanged."""
         if not panel.angle or not math.isfinite(value):
             return value
         value = _nearest_turn(value, self._angles.get((panel.path, uav), math.nan), 2.0 * math.pi * panel.scale)
@@ -133,22 +133,22 @@ class Plots:
         return value
 
     def _extremes(self, panel: Panel, snapshot: Snapshot) -> list[float]:
-        """The lowest and the highest value of all whom a panel is about."""
+        """Return the lowest and the highest value of all UAVs of a panel."""
         values = (panel.read(panel.value, snapshot.uavs.get(uav)) for uav in uavs_of(panel, self._subject))
         finite = [value for value in values if math.isfinite(value)]
         return [min(finite, default=math.nan), max(finite, default=math.nan)]
 
     def _curve_uavs(self, include_leaders: bool) -> list[int | None]:
-        """Whose curves there are, of all or of followers; None keeps a place for whoever comes into view."""
+        """Return the UAVs that have curves, of all or of followers; None reserves a curve for a later one."""
         detail = self._detail
         places = [*detail.shown, *[None] * (detail.capacity - len(detail.shown))]
         if include_leaders:
             return places
-        # Places must not move: a leader that comes into view later leaves an empty one.
+        # Curves must not move: a leader that is added later leaves an empty one.
         return [None if uav in self._leaders else uav for uav in places if uav not in self._leaders_at_first]
 
     def _band(self, panel: Panel, snapshot: Snapshot) -> list[Entry]:
-        """What lies between the leaders. Rerun shades one standard deviation about a measured value."""
+        """Return the band between the leaders. Rerun shades one standard deviation around a measured value."""
         edge = [panel.read(panel.value, snapshot.uavs.get(uav)) for uav in self._subject.leaders]
         if not edge or not all(map(math.isfinite, edge)):
             return []
@@ -160,12 +160,12 @@ class Plots:
 
 
 def _series_path(panel: Panel) -> str:
-    """Entity of a panel's series; a band beside them is an entity of its own."""
+    """Return the entity path of a panel's series; a band has an entity of its own."""
     return f"{panel.path}/uavs" if panel.band else panel.path
 
 
 def _nearest_turn(angle: float, other: float, turn: float) -> float:
-    """``angle`` within half a ``turn`` of another one, if that is known."""
+    """Return ``angle`` shifted by whole turns to within half a ``turn`` of another angle, if that is finite."""
     return angle - turn * round((angle - other) / turn) if math.isfinite(angle) and math.isfinite(other) else angle
 
 
@@ -181,11 +181,11 @@ def _view(panel: Panel, extremes: bool) -> rrb.View:
 
 
 def time_series(origin: str, title: str) -> rrb.View:
-    """A plot of the last `WINDOW` seconds."""
+    """Return a plot of the last `WINDOW` seconds."""
     return rrb.TimeSeriesView(
         origin=origin,
         name=title,
-        # A legend of eight lines would cover the curves; the other views show the colours, the pointer names a curve.
+        # A legend of eight lines would cover the curves; other views show the colours, and hovering names a curve.
         plot_legend=rrb.PlotLegend(visible=False),
         time_ranges=rrb.VisibleTimeRange(
             "t",

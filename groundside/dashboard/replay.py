@@ -1,4 +1,4 @@
-"""A recorded run as a sequence of snapshots, so that the dashboard shows it as it would have shown it live."""
+"""Convert a recorded run to a sequence of snapshots, so that the dashboard shows it as in the live flight."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ __all__ = ["RATE", "draw_run", "events_of", "snapshots_of"]
 RATE = 10.0
 """Snapshots per simulated second."""
 _ROUNDING = 1e-6
-"""Rounding of times, s."""
+"""Tolerance when times are compared, s."""
 
 
 class _Links:
-    """The states of a run's links over time."""
+    """Link states of a run over time."""
 
     def __init__(self, run: Run) -> None:
         links = run.links
@@ -33,7 +33,7 @@ class _Links:
         self._columns = {name: links[name] for name in ("uav", "sender", "received", "lost", "oldest")}
 
     def at(self, t: float) -> dict[int, dict[int, LinkState]]:
-        """The last report of each link up to ``t``, by receiver and sender."""
+        """Return the last state of each link up to ``t``, by receiver and sender."""
         place = int(np.searchsorted(self._times, t + _ROUNDING)) - 1
         if place < 0:
             return {}
@@ -62,7 +62,7 @@ class _Links:
 
 
 def events_of(run: Run) -> list[Event]:
-    """What was logged, in the order of the log."""
+    """Return the events of a run, in the order of the log."""
     return [
         Event(
             float(e["t"]), str(e["severity"]), str(e["text"]), e.get("uav"), e.get("who", ""), e.get("outcome", "")
@@ -72,7 +72,7 @@ def events_of(run: Run) -> list[Event]:
 
 
 def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
-    """The run at ``rate`` (Hz of simulated time), from its beginning to its last recorded row."""
+    """Yield snapshots of a run at ``rate`` (Hz, simulated time), from its start to its last recorded row."""
     mission = run.mission
     plant = find(mission.plant)
     signals = [quantity.name for quantity in mission.scheme.signals]
@@ -108,7 +108,7 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
             }
             states[uav] = UavState(t=float(own[row]), links=link_states.get(uav, {}), **values)
         new_events = []
-        # What was logged after the last picture belongs to it.
+        # The last snapshot includes all later events.
         while next_event < len(events) and (k == last or events[next_event].t <= t + _ROUNDING):
             new_events.append(events[next_event])
             next_event += 1
@@ -116,10 +116,10 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
 
 
 def draw_run(run: Run, recording: Path, rate: float = RATE) -> Path:
-    """Draw a run's dashboard into a recording (.rrd), from what it recorded."""
+    """Draw a run's dashboard into a recording (.rrd) and return its path."""
     from ftcc.groundside.dashboard import Dashboard, Subject
 
-    recording.touch()  # where that cannot be written, nothing is drawn
+    recording.touch()  # fails here, before anything is drawn, if the file cannot be written
     dashboard = Dashboard(Subject.of(run.mission), recording=recording, viewer="none")
     for snapshot in snapshots_of(run, rate):
         dashboard.log(snapshot)

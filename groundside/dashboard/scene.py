@@ -1,6 +1,6 @@
-"""The swarm in space: aircraft in their attitude, their trails, what they refer to, and what is wrong with them.
+"""Draw the swarm in space: aircraft with their attitudes, trails, references and labels.
 
-The world's axes are east, north and up, which are right-handed; x (north) and y (east) of the snapshot change places.
+The axes of the world are east, north and up (right-handed); x (north) and y (east) of a snapshot are swapped.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ __all__ = ["LANE", "TRAIL", "Scene"]
 TRAIL = {"containment": 5.0, "formation": 5.0, "attitude": 5.0, "fire": 40.0}
 """Length of the trails, s, by family."""
 LANE = 12.0
-"""Distance at which aircraft that fly above one another are drawn side by side, m."""
+"""Sideways distance at which aircraft of one vertical plane are drawn, m."""
 
 _RANK = 24.0
-"""Distance of the ranks in which a big swarm is drawn that flies abreast, m."""
+"""Distance between the ranks in which a big swarm in line abreast is drawn, m."""
 
 _REFERENCES: dict[str, dict[str, tuple[str, ...]]] = {
     "containment": {"x": ("x_hat",), "z": ("z_r", "zhat", "z_hat")},
@@ -39,16 +39,15 @@ _REFERENCES: dict[str, dict[str, tuple[str, ...]]] = {
     "attitude": {"mu": ("mu_d",), "alpha": ("alpha_d",), "beta": ("beta_d",)},
     "fire": {"x": ("x_ref",), "y": ("y_ref",), "z": ("z_ref",)},
 }
-"""Signals that say where a UAV should be, or how it should lie in the air, by the true state that they stand for."""
+"""Signals that are references of position or attitude, by the true state that they refer to."""
 
 
 class Scene:
     """Draws the swarm around its centre.
 
-    The centre moves with the swarm, so that hundreds of metres of common forward flight do not carry it out of sight;
-    positions in the data are the true ones, but for lanes: aircraft that share one vertical plane, as those of
-    longitudinal schemes do, are moved east by `LANE` each; those of a big swarm that fly in one line abreast, which
-    would be kilometres long, are put in ranks.
+    The view follows the centre of the swarm, so that the swarm does not fly out of sight. Positions are the true ones,
+    with two exceptions. Aircraft in one vertical plane, as in longitudinal schemes, are drawn side by side, `LANE`
+    apart. A big swarm in line abreast, which would be kilometres wide, is drawn in ranks.
     """
 
     def __init__(self, subject: Subject, first: Snapshot, detail: Detail) -> None:
@@ -59,7 +58,7 @@ class Scene:
         self._colors = colors(self._uavs)
         self._index = {uav: i for i, uav in enumerate(self._uavs)}
         self._lanes: NDArray[np.float64] = np.zeros((len(self._uavs), 2))
-        """How far each is moved, east and north, m."""
+        """Offset between drawn and true position of each UAV, east and north, m."""
         self._ranks = 1
         self._positions = np.full((len(self._uavs), 3), np.nan)
         self._update_positions(first)
@@ -81,13 +80,13 @@ class Scene:
         self._surroundings = Surroundings(subject, self._positions, in_ranks=self._ranks > 1)
         self.links = Links(subject, detail)
         self._others: list[int] = []
-        """Who was drawn as a stick last."""
+        """UAVs drawn as sticks in the previous snapshot."""
         self._labels: dict[int, str] = {}
         self._poses = Poses()
 
     @property
     def title(self) -> str:
-        """What the view shows, for its name."""
+        """Return the title of the view, with hints how to read it."""
         notes = [f"airframes x{self._scale}"] if self._scale > 1 else []
         ranks = f" in {self._ranks} ranks, truly abreast" if self._ranks > 1 else ""
         notes += [f"side by side at {LANE:g} m{ranks}"] if self._lanes.any() else []
@@ -96,7 +95,7 @@ class Scene:
         return "Swarm about its moving centre" + (f" ({', '.join(notes)})" if notes else "")
 
     def view(self) -> rrb.Spatial3DView:
-        """The swarm from behind, right and above."""
+        """Return the view of the swarm, from behind, right and above."""
         eye = self._radius * np.array([0.45, -1.6, 1.05])
         return rrb.Spatial3DView(
             origin="/world/centre",
@@ -118,7 +117,7 @@ class Scene:
         )
 
     def static(self) -> list[Entry]:
-        """Shapes and colours."""
+        """Return shapes and colours."""
         width = rr.Radius.ui_points(0.75)
         trails = rr.LineStrips3D.from_fields(colors=self._trail_colors(), radii=width)
         entries = [Entry("/world", None, rr.ViewCoordinates.RIGHT_HAND_Z_UP), *self._shapes(self._detail.shown)]
@@ -126,7 +125,7 @@ class Scene:
         return entries + self._surroundings.static() + self.links.static()
 
     def _shapes(self, uavs: Iterable[int]) -> list[Entry]:
-        """What is drawn of UAVs in full."""
+        """Return the shapes of UAVs that are drawn in full."""
         entries = []
         vertices, normals = airframe(self._scale)
         strips = outline(self._scale)
@@ -143,14 +142,14 @@ class Scene:
         return entries
 
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
-        """Everything that moves; ``new`` are those that have just come into view."""
+        """Return everything that moves; ``new`` are the UAVs that are drawn in full from now on."""
         t = snapshot.t
         before = self._positions.copy()
         self._update_positions(snapshot)
         after = self._positions
         known = np.isfinite(after[:, 0])
         if known.any():
-            # Those of a big swarm that are left behind must not drag the view along.
+            # The median, because UAVs that a big swarm leaves behind must not move the centre.
             middle = np.median if self._detail.crowded else np.mean
             self._centre = middle(after[known], axis=0)
         entries = [Entry("/world/centre", t, rr.Transform3D(translation=self._centre))]
@@ -178,13 +177,13 @@ class Scene:
         return [self._colors[uav] for uav in self._detail.shown]
 
     def _trails(self, t: float, before: NDArray[np.float64], after: NDArray[np.float64]) -> list[Entry]:
-        """The way of those drawn in full since the last picture."""
+        """Return the paths of UAVs drawn in full since the previous snapshot."""
         rows = [self._index[uav] for uav in self._detail.shown]
         ways = np.stack([before[rows], after[rows]], axis=1)
         return [Entry("/world/trails", t, rr.LineStrips3D.from_fields(strips=ways))]
 
     def _sticks(self, snapshot: Snapshot) -> list[Entry]:
-        """All others, in one call."""
+        """Return all other UAVs, as one entry."""
         if not self._detail.crowded:
             return []
         full = set(self._detail.shown)
@@ -203,12 +202,12 @@ class Scene:
         return [Entry("/world/others", snapshot.t, drawn)]
 
     def _update_positions(self, snapshot: Snapshot) -> None:
-        true_places = [
+        positions = [
             (self._index[uav], state.truth["y"], state.truth["x"], state.truth["z"])
             for uav, state in snapshot.uavs.items()
             if uav in self._index
         ]
-        values = np.array(true_places, dtype=np.float64).reshape(-1, 4)
+        values = np.array(positions, dtype=np.float64).reshape(-1, 4)
         values = values[np.isfinite(values).all(axis=1)]
         rows = values[:, 0].astype(int)
         self._positions[rows] = values[:, 1:]
@@ -219,12 +218,12 @@ class Scene:
         return np.array((truth["y"] + east, truth["x"] + north, truth["z"]))
 
     def _assign_lanes(self) -> None:
-        """Put aircraft of one vertical plane side by side; of a big swarm also those of one line abreast, in ranks."""
+        """Draw aircraft in one vertical plane side by side, and a big swarm in line abreast in ranks."""
         n, known = len(self._uavs), self._known_positions()
         if n < 2 or not len(known):
             return
         in_plane, abreast = (np.ptp(known[:, :2], axis=0) < 1.0).tolist()
-        # Where places along or across the flight mean something, they must stay.
+        # Ranks only for longitudinal schemes without obstacles, where horizontal positions carry no information.
         longitudinal = self._subject.family in ("containment", "formation")
         in_ranks = self._detail.crowded and abreast and longitudinal and not self._subject.obstacles
         if not (in_plane or in_ranks):
@@ -239,7 +238,7 @@ class Scene:
             self._lanes[:, 1] = -_RANK * rank
 
     def _framed_positions(self, snapshot: Snapshot) -> NDArray[np.float64]:
-        """Positions of those about whom a frame is drawn: of a big swarm not of followers who have been left behind."""
+        """Return positions for the hull's frame; nan for silent followers of a big swarm, which are left behind."""
         if not self._detail.crowded:
             return self._positions
         left = [
@@ -255,7 +254,7 @@ class Scene:
         return known
 
     def _reference(self, t: float, uav: int, state: UavState) -> list[Entry]:
-        """The aircraft where, or as, its law wants it."""
+        """Return the outline of an aircraft at its reference position or attitude."""
         if not self._references or uav in self._leaders:
             return []
         wanted = {name: state.signals.get(signal, math.nan) for name, signal in self._references.items()}

@@ -1,4 +1,4 @@
-"""Shapes and directions of the three-dimensional views: an airframe, arrows, poses."""
+"""Compute shapes of the three-dimensional views: airframes, arrows, poses."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ _STICKS = (
     ((0.0, -1.62, 0.0), (0.0, 1.62, 0.0)),
     ((-1.1, 0.0, 0.0), (-1.3, 0.0, -0.55)),
 )
-"""Fuselage, wing and fin of an aircraft from afar."""
+"""Fuselage, wing and fin of an aircraft drawn as three lines."""
 
 _ANGLES = ("chi", "gamma", "mu", "alpha", "beta")
-"""Of `body_attitude`."""
+"""Arguments of `body_attitude`."""
 _NORTH_TO_WORLD = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 """Rotation from north-east-down to east-north-up as a quaternion, scalar first."""
 
 
 class Poses:
-    """Where an aircraft is drawn, and how it lies in the air there."""
+    """Converts true states to poses."""
 
     def __init__(self) -> None:
         self._message = np.zeros(len(StateMessage._fields))
@@ -54,7 +54,7 @@ class Poses:
         truth: Mapping[str, float],
         turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
     ) -> rr.Transform3D:
-        """At ``place`` (east, north, up; m) with the attitude of true states by name; a missing one is 0.
+        """Return the pose at ``place`` (east, north, up; m) with the attitude of ``truth``; a missing state is 0.
 
         ``turn`` is a further rotation, a quaternion in the world's axes.
         """
@@ -69,13 +69,13 @@ def sticks(
     scale: float,
     turns: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Aircraft from afar, three lines each: shape (3 n, 2, 3).
+    """Return aircraft as three lines each, shape (3 n, 2, 3).
 
-    ``places`` (n, 3) and attitudes are as those of `Poses`; ``turns`` (n, 3, 3) are further rotations.
+    ``places`` (n, 3) and ``truths`` as in `Poses.of`; ``turns`` (n, 3, 3) are further rotations.
     """
     angles = [[truth.get(name, 0.0) for name in _ANGLES] for truth in truths]
     axes = np.array([body_axes(*body_attitude(*five)) for five in angles]).reshape(-1, 3, 3)
-    # Rows are nose, right wing and belly: from north, east, down to east, north, up.
+    # Rows are the body axes forward, right and down; convert from north-east-down to east-north-up.
     axes = axes[:, :, [1, 0, 2]] * (1.0, 1.0, -1.0)
     if turns is not None:
         axes = axes @ turns.transpose(0, 2, 1)
@@ -84,14 +84,14 @@ def sticks(
 
 
 def stick_colors(tints: Mapping[int, Color], uavs: Sequence[int]) -> NDArray[np.uint8]:
-    """Colours of the `sticks` of UAVs, shape (3 n, 3)."""
+    """Return the colours of the `sticks` of UAVs, shape (3 n, 3)."""
     return np.repeat(np.array([tints[uav] for uav in uavs], np.uint8).reshape(-1, 3), len(_STICKS), axis=0)
 
 
 def arrows(
     start: NDArray[np.float64], end: NDArray[np.float64], gap: float, aside: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origins and vectors of arrows that leave room at both ends and keep to the right of the straight line."""
+    """Return origins and vectors of arrows, shortened by ``gap`` at both ends and shifted right by ``aside``, m."""
     along = end - start
     length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     ahead = along / length
@@ -103,7 +103,7 @@ def arrows(
 
 
 def airframe(scale: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Vertices and normals, shape (n, 3), three vertices to a triangle."""
+    """Return vertices and normals, shape (n, 3), three vertices per triangle."""
     triangles = [(part[0], part[i], part[i + 1]) for part in _PARTS for i in range(1, len(part) - 1)]
     nose, station, half, tail = _BODY
     ring = [(station, half * math.cos(a), half * math.sin(a)) for a in np.arange(6) * math.pi / 3.0]
@@ -116,5 +116,5 @@ def airframe(scale: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 def outline(scale: float) -> list[NDArray[np.float32]]:
-    """The airframe's edges as closed strips: what a reference looks like."""
+    """Return the airframe's edges as closed strips, which represent a reference."""
     return [scale * np.array([*part, part[0]], dtype=np.float32) for part in _PARTS]

@@ -1,4 +1,4 @@
-"""What is known of the swarm at one instant: what the station gathers and the dashboard draws."""
+"""State of the swarm at one instant: the station collects it and the dashboard draws it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Event", "LinkState", "Pace", "Snapshot", "UavState"]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened: a fault, a link event, a text from a vehicle, a process that died."""
+    """An event: a fault, a link event, a text from a vehicle, a process that died."""
 
     t: float
     """Simulated time, s."""
@@ -19,21 +19,21 @@ class Event:
     text: str
     uav: int | None = None
     who: str = ""
-    """Who asked for it (MAVLink system/component), where somebody on the ground did."""
+    """Sender of the command that caused it (MAVLink system/component), if any."""
     outcome: str = ""
-    """What became of that: accepted, denied, armed, acts, ..."""
+    """Outcome of that command: accepted, denied, armed, acts, ..."""
 
 
 @dataclass(frozen=True)
 class LinkState:
-    """One in-edge as its receiver sees it."""
+    """State of a link at its receiver."""
 
     age: float
-    """Age of the newest record heard, s; inf before the first."""
+    """Age of the newest record received, s; inf before the first."""
     received: int
     lost: int
     cut: bool
-    """The channel is blocked or a radio is off."""
+    """Whether the link is cut or a radio is off."""
 
 
 @dataclass(frozen=True)
@@ -43,52 +43,52 @@ class UavState:
     t: float
     """Simulated time of these values, s."""
     truth: Mapping[str, float]
-    """By the names of ``sim.plant.TRUTH``: x, y, z (up), V, gamma, chi, mu, alpha, beta, theta, p, q, r."""
+    """True states by the names of ``sim.plant.TRUTH``: x, y, z (up), V, gamma, chi, mu, alpha, beta, theta, p, q, r."""
     command: Mapping[str, float]
-    """Command in force, by the names of ``ACTUATORS`` (rad, N)."""
+    """Current commands by the names of ``ACTUATORS`` (rad, N)."""
     acting: Mapping[str, float]
-    """What acts on the airframe."""
+    """Actual actuator positions (rad, N)."""
     effectiveness: Mapping[str, float]
     """Remaining effectiveness of each actuator; 1 = healthy."""
     bias: Mapping[str, float]
     signals: Mapping[str, float]
-    """The scheme's ``SIGNALS``; empty for a leader."""
+    """Values of the scheme's ``SIGNALS``; empty for a leader."""
     links: Mapping[int, LinkState]
-    """In-edges by sender."""
+    """Incoming links by sender."""
     disturbances: Mapping[str, float] = field(default_factory=dict)
-    """True ones, by the names of the plant."""
+    """True disturbances by the names of the plant."""
     mode: str = ""
-    """Of its autopilot: mission, hold, offboard; empty if it has not said so."""
+    """Flight mode: mission, hold or offboard; empty if unknown."""
     late: int = 0
     """Ticks in which the command came too late."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast the swarm flies on the wall clock, and why not faster."""
+    """How fast the swarm flies on the wall clock, and what limits it."""
 
     factor: float
-    """Times real time, reached over the last seconds; nan while it is not known yet."""
+    """Times real time, over the last seconds; nan if not measured yet."""
     asked: float | None
-    """Times real time that were asked for; None = as fast as possible."""
+    """Requested times real time; None: as fast as possible."""
     limit: str = ""
-    """What limits it, in one short sentence; empty if nothing does."""
+    """Limit, in one short sentence; empty if there is none."""
     advice: str = ""
-    """What would help."""
+    """Advice how to fly faster."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The swarm."""
+    """State of the swarm at one instant."""
 
     t: float
     """Simulated time, s."""
     uavs: Mapping[int, UavState]
     events: tuple[Event, ...] = field(default=())
-    """What happened since the last snapshot."""
+    """Events since the previous snapshot."""
     pace: Pace | None = None
-    """None where nobody measures it, as in a recorded run."""
+    """None if it is not measured, as in a recorded run."""
 
     def after(self, earlier: tuple[Event, ...]) -> Snapshot:
-        """The same with what happened before."""
+        """Return this snapshot with ``earlier`` events put before its own."""
         return replace(self, events=earlier + self.events)

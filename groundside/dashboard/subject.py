@@ -1,4 +1,4 @@
-"""What a dashboard shows: the swarm, apart from what happens to it."""
+"""Describe the swarm that a dashboard shows: all that does not change in flight."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Family", "Subject"]
 
 Family = Literal["containment", "formation", "attitude", "fire"]
-"""What kind of flight the blueprint is for."""
+"""Kind of flight, which selects the blueprint."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Subject:
     """Name of the recording."""
     family: Family
     graph: Graph
-    """Who hears whom."""
+    """Communication graph."""
     signals: tuple[Quantity, ...]
     """The scheme's ``SIGNALS``."""
     limits: Mapping[str, tuple[float, float]]
@@ -39,13 +39,13 @@ class Subject:
     """Names and units of the plant's disturbances."""
     obstacles: tuple[Obstacle, ...] = ()
     fire: Fire | None = None
-    """What the swarm flies around; its centre is told by the scheme's signals."""
+    """Fire that the swarm flies around; the scheme's signals give its centre."""
     stale_after: float = 0.5
-    """Age from which what was heard last counts as stale, s."""
+    """Age of the newest record from which a link counts as stale, s."""
 
     @classmethod
     def of(cls, mission: Mission) -> Subject:
-        """What is to be shown of a mission's flight."""
+        """Return the subject of a mission."""
         plant = find(mission.plant)
         follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
         return cls(
@@ -61,12 +61,12 @@ class Subject:
 
     @property
     def followers(self) -> tuple[int, ...]:
-        """Ids, ascending."""
+        """Return their ids, ascending."""
         return tuple(sorted(self.graph.followers))
 
     @property
     def leaders(self) -> tuple[int, ...]:
-        """Ids, ascending."""
+        """Return their ids, ascending."""
         return tuple(sorted(self.graph.leaders))
 
 

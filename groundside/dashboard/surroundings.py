@@ -1,4 +1,4 @@
-"""What surrounds the swarm: the leaders' hull, obstacles, the front of a fire."""
+"""Draw the surroundings of the swarm: the leaders' hull, obstacles, the front of a fire."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from ftcc.groundside.palette import FIRE, GRAY
 __all__ = ["Surroundings"]
 
 _MARGIN = 6.0
-"""How far frames and obstacles reach beyond the swarm sideways, m."""
+"""Sideways distance by which frames and obstacles extend beyond the swarm, m."""
 _APART = 1.0
-"""Leaders that begin farther apart than this along the flight span a box, not two levels, m."""
+"""If leaders start farther apart than this along the flight, the hull is drawn as a box, m."""
 _OBSTACLE = (*GRAY, 70)
 _BURNT = (*FIRE, 36)
 _FRONT_EVERY = 1.0
-"""Time from one front to the next, s: it grows by a metre a second."""
+"""Time between two drawings of the front, s; it grows by one metre per second."""
 _OBSTACLE_HEIGHT = 200.0
-"""Height of an obstacle that is drawn, from its top downwards, m."""
+"""Drawn height of an obstacle, from its top downwards, m."""
 
 
 class Surroundings:
-    """Draws the hull about the swarm, and the obstacles beneath it.
+    """Draws the leaders' hull, obstacles and a fire.
 
-    ``positions`` (n, 3) are where the UAVs are drawn first; ``in_ranks``: they truly fly abreast.
+    ``positions`` (n, 3) are the first drawn positions; ``in_ranks``: drawn in ranks, though in line abreast.
     """
 
     def __init__(self, subject: Subject, positions: NDArray[np.float64], in_ranks: bool = False) -> None:
@@ -45,14 +45,14 @@ class Surroundings:
 
     @property
     def notes(self) -> list[str]:
-        """What the name of the view says of it."""
+        """Return hints for the title of the view."""
         hull = "box: between the leaders" if self._boxed else "frames: lowest and highest leader"
         notes = [hull] if len(self._leaders) > 1 else []
         notes += ["blocks: obstacles"] if self._subject.obstacles else []
         return notes + (["red: fire"] if self._subject.fire else [])
 
     def static(self) -> list[Entry]:
-        """Obstacles, and how the hull looks."""
+        """Return the obstacles and the style of the hull."""
         entries = [
             Entry("/world/hull", None, rr.LineStrips3D.from_fields(colors=GRAY, radii=rr.Radius.ui_points(1.0))),
         ]
@@ -70,11 +70,11 @@ class Surroundings:
         return entries
 
     def draw(self, snapshot: Snapshot, positions: NDArray[np.float64]) -> list[Entry]:
-        """What changes; ``positions`` (n, 3) of all UAVs."""
+        """Return hull and fire; ``positions`` (n, 3) of all UAVs."""
         return self._hull(snapshot.t, positions) + self._front(snapshot)
 
     def _front(self, snapshot: Snapshot) -> list[Entry]:
-        """The border of the fire on the ground, about the centre that the UAVs refer to."""
+        """Return the border of the fire on the ground, around the centre that the UAVs use."""
         if self._subject.fire is None or snapshot.t < self._front_at:
             return []
         with_fire = (state.signals for state in snapshot.uavs.values() if "fire_north" in state.signals)
@@ -95,7 +95,7 @@ class Surroundings:
         ]
 
     def _hull(self, t: float, positions: NDArray[np.float64]) -> list[Entry]:
-        """Between the leaders: two levels, or a box where they begin apart."""
+        """Return the hull between the leaders: two levels, or a box if they start apart."""
         leaders = positions[self._leaders]
         if len(leaders) < 2 or not np.isfinite(leaders).all():
             return []

@@ -1,4 +1,4 @@
-"""The swarm in words: a table of all UAVs and the log of events."""
+"""Show the swarm as text: a table of all UAVs and the log of events."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from ftcc.groundside.dashboard.viewer import Entry
 __all__ = ["Table", "event_entries", "log_view"]
 
 _PERIOD = 10
-"""Snapshots from one table to the next."""
+"""Number of snapshots from one table to the next."""
 _MAX_ROWS = 24
-"""Rows for UAVs in trouble, in a big swarm."""
+"""Largest number of rows for UAVs in trouble, in a big swarm."""
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class Table:
-    """Writes the table once in a while; it is text, and dearer than a curve."""
+    """Writes the table at intervals, because text costs more than a curve."""
 
     def __init__(self, subject: Subject, detail: Detail) -> None:
         self._subject = subject
@@ -40,11 +40,11 @@ class Table:
         self._countdown = 0
 
     def view(self) -> rrb.TextDocumentView:
-        """The swarm as a table."""
+        """Return the view of the table."""
         return rrb.TextDocumentView(origin="/swarm", name="Swarm", titlebar=False)
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
-        """The table, if it is due."""
+        """Return the table if it is due."""
         due = self._countdown == 0
         self._countdown = (self._countdown + 1) % _PERIOD
         if not due:
@@ -52,16 +52,16 @@ class Table:
         return [Entry("/swarm", snapshot.t, rr.TextDocument(self._text(snapshot), media_type="text/markdown"))]
 
     def _text(self, snapshot: Snapshot) -> str:
-        heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "hears", "late ticks", "mode")
+        heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "links up", "late ticks", "mode")
         rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in self._uavs_in_rows(snapshot))]
-        # A recording knows no modes.
+        # A recording has no modes.
         shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
         above = [describe_pace(snapshot.pace)] if snapshot.pace is not None else []
         above += [self._summary(snapshot)] if self._detail.crowded else []
         return "\n".join([*(f"{line}\n" for line in above), *(f"| {' | '.join(row[:shown])} |" for row in rows)])
 
     def _uavs_in_rows(self, snapshot: Snapshot) -> list[int]:
-        """Whom the table tells of: everybody; of a big swarm those in trouble, then the others drawn in full."""
+        """Return the UAVs in the table: all; of a big swarm those in trouble, then the others drawn in full."""
         uavs = sorted(self._subject.graph.uavs)
         if not self._detail.crowded:
             return uavs
@@ -70,11 +70,11 @@ class Table:
         return worst + [uav for uav in sorted(self._detail.shown) if uav not in worst]
 
     def _summary(self, snapshot: Snapshot) -> str:
-        """A big swarm in one line."""
+        """Summarize a big swarm in one line."""
         uavs, states = self._subject.graph.uavs, snapshot.uavs.values()
         silent = sum(is_silent(state, snapshot) for state in states)
         counts = {
-            "not heard": len(uavs) - len(states),
+            "without telemetry": len(uavs) - len(states),
             "silent": silent,
             "with faults": sum(bool(faulty_actuators(state)) for state in states),
             "late ticks": sum(state.late for state in states),
@@ -89,7 +89,7 @@ class Table:
         label = f"{uav} leader" if leads else f"{uav}"
         state = snapshot.uavs.get(uav)
         if state is None:
-            return (label, "", "", "not heard", "", "", "")
+            return (label, "", "", "no telemetry", "", "", "")
         silent = describe_silence(state, snapshot)
         health = silent or describe_faults(state) or ("" if leads else "healthy")
         z, speed = state.truth["z"], state.truth["V"]
@@ -106,19 +106,19 @@ def _describe_links(state: UavState) -> str:
 
 
 def log_view() -> rrb.TextLogView:
-    """Events, by simulated time."""
-    # The time stands in the text: Rerun's column for it is too narrow to read.
+    """Return the view of the event log."""
+    # The text includes the time, because Rerun's column for it is too narrow to read.
     clock = TimelineColumn("t", visible=False)
     columns = rrb.TextLogColumns(timeline_columns=[clock], text_log_columns=["loglevel", "body"])
     return rrb.TextLogView(origin="/events", name="Events", columns=columns)
 
 
 def event_entries(new: Iterable[Event]) -> list[Entry]:
-    """Lines of the event log."""
+    """Return events as entries of the event log."""
     entries = []
     for event in new:
         whose = f"{name(event.uav)}: " if event.uav is not None and not event.text.startswith("UAV ") else ""
-        asked = f" ({event.who} asked)" if event.who else ""
+        asked = f" (from {event.who})" if event.who else ""
         outcome = f": {event.outcome}" if event.outcome else ""
         text = f"{event.t:.1f} s  {whose}{event.text}{outcome}{asked}"
         level = _LEVELS.get(event.severity, event.severity.upper())

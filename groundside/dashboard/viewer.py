@@ -1,8 +1,8 @@
-"""The Rerun viewer beside the station: a process of its own, fed by a thread that the swarm never waits for.
+"""Run the Rerun viewer as a separate process, fed by a thread so that the swarm never waits for it.
 
-Rerun's client holds back its caller once a viewer has stopped reading, for ever if the viewer never reads again, and
-with it every other sink of the same stream. So the viewer has a stream of its own, written by a thread from a bounded
-queue; what does not fit is not shown. A client that is being held back lets go when the viewer's process ends.
+Rerun's client blocks its caller, and every other sink of the same stream, while a viewer does not read. So the viewer
+has its own stream, written by a thread from a bounded queue; entries that do not fit are not shown. A blocked client
+returns when the viewer's process ends.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ Kind = Literal["web", "native", "none"]
 
 _LOOPBACK = "127.0.0.1"
 _START_TIMEOUT = 20.0
-"""Longest wait for the viewer to listen, s."""
+"""Longest wait until the viewer listens, s."""
 _QUEUE_SIZE = 64
-"""Frames that wait for the viewer; at 10 Hz the six seconds that a slow start takes."""
+"""Capacity of the queue in frames; at 10 Hz six seconds, the time of a slow start."""
 
 _BETWEEN_FLUSHES = 0.15
-"""Shortest time between two deliveries, s: a page that joins late reads them one by one."""
+"""Shortest time between two flushes, s; a page that is opened late reads them one by one."""
 _UNREAD = 50
-"""Frames sent before the viewer must have read them."""
+"""Number of frames sent before waiting until the viewer has read them."""
 _BEHIND = "the viewer does not keep up: not everything is shown"
 
 _DIE_WITH_PARENT = """
@@ -48,13 +48,13 @@ import ctypes, os, signal, sys
 PR_SET_PDEATHSIG = 1
 ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 if os.getppid() != int(sys.argv[1]):
-    sys.exit("the station ended before its viewer began")
+    sys.exit("the station ended before its viewer started")
 os.execv(sys.argv[2], sys.argv[2:])
 """
-"""Runs a program that is killed when the process that started it ends, however that ends (Linux).
+"""Program that runs another one, which is killed when its parent process ends (Linux).
 
-A short-lived interpreter sets this for itself and becomes the program: a function run between fork and exec in the
-station, which has threads, could deadlock.
+A short-lived interpreter sets this for itself and then becomes the program. A function between fork and exec could
+deadlock, because the station has threads.
 """
 
 
@@ -63,18 +63,18 @@ BLUEPRINT = ""
 
 
 class Entry(NamedTuple):
-    """Something to log."""
+    """One item to log."""
 
     path: str
-    """Entity."""
+    """Entity path."""
     t: float | None
-    """Simulated time, s; None = holds at all times."""
+    """Simulated time, s; None: valid at all times."""
     what: Any
     """Archetype."""
 
 
 def write(stream: rr.RecordingStream, entries: Iterable[Entry]) -> None:
-    """Log ``entries``."""
+    """Log ``entries`` to a stream."""
     now = None
     for path, t, what in entries:
         if path == BLUEPRINT:
@@ -90,26 +90,26 @@ def write(stream: rr.RecordingStream, entries: Iterable[Entry]) -> None:
 
 
 class Viewer:
-    """A viewer that runs as long as this object, or shorter.
+    """A viewer process, ended by `close`.
 
-    The thread that creates it must live as long as the process (Linux ends the viewer with that thread).
+    The thread that creates it must live as long as the process, because Linux ends the viewer with that thread.
 
     Parameters
     ----------
     kind : "web" or "native"
-        A server with the page that a browser shows, on loopback only, or a window.
+        "web": a server on loopback with a page for a browser; "native": a window.
     ports : (int, int), optional
-        Of the data and of the page; free ones if None.
+        Ports of the data and of the page; free ports if None.
     open_browser : bool
-        Show the page in the user's browser, if there is a screen.
+        Whether to open the page in the user's browser, if there is a screen.
     connect : callable, optional
-        Gives the stream to the viewer at an address; may block.
+        Returns a stream to the viewer at an address; may block.
     recording : Path, optional
-        A file (.rrd) to show instead of what is logged.
+        A recording (.rrd) to show instead of logged entries.
     """
 
     address: str | None
-    """Of the page."""
+    """Address of the page; None if there is no page."""
 
     def __init__(
         self,
@@ -153,7 +153,7 @@ class Viewer:
         self._thread.start()
 
     def show(self, entries: list[Entry], timeout: float = 0.0) -> None:
-        """Show ``entries`` soon, or never; waits for a viewer that lags for ``timeout`` (wall s) at most."""
+        """Queue ``entries``; drop them if the queue stays full for ``timeout`` (wall s)."""
         if self._ended.is_set():
             return
         try:
@@ -168,21 +168,21 @@ class Viewer:
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of what shows, if this process has started it."""
+        """Return the process ids of the viewer, if this process started one."""
         return [] if self._process is None else [self._process.pid]
 
     def take_problem(self) -> str | None:
-        """What went wrong since the last call; each kind of problem once."""
+        """Return a problem since the last call; each kind of problem is returned once."""
         problem, self._problem = self._problem, None
         return problem
 
     def close(self) -> None:
-        """Let the viewer read what was sent, for up to a second, and end it."""
+        """Give the viewer up to a second to read what was sent, and end it."""
         self._ended.set()
         try:
             self._frames.put_nowait(None)
         except queue.Full:
-            pass  # The viewer has stopped reading: nothing that it could be given any more.
+            pass  # The viewer has stopped reading: it cannot be given anything more.
         else:
             self._thread.join(1.0)
         if self._page is not None:
@@ -194,13 +194,13 @@ class Viewer:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        # Whatever held the thread back ended with the process; it then sees that the viewer is gone.
+        # A blocked thread continues now that the process has ended, and ends too.
         self._thread.join(0.5)
         self._output.close()
 
     def _start(self, options: list[str]) -> subprocess.Popen[bytes] | None:
         if _listening(self._data_port):
-            # Rerun would take whoever listens there for the viewer.
+            # Rerun would connect to the other program as if it were the viewer.
             self._report(f"no viewer: port {self._data_port} is in use")
             return None
         program = [str(viewer_program()), *options]
@@ -208,7 +208,7 @@ class Viewer:
             program = [sys.executable, "-I", "-S", "-c", _DIE_WITH_PARENT, str(os.getpid()), *program]
         # With CI set, Rerun neither sends usage statistics nor leaves their files in the user's home.
         environment = {"RUST_LOG": "warn"} | os.environ | {"CI": "true"}
-        # A session of its own: Ctrl-C is for the station, which ends the viewer when all is written.
+        # In a new session, Ctrl-C reaches only the station, which ends the viewer when everything is written.
         return subprocess.Popen(
             program,
             env=environment,
@@ -221,8 +221,8 @@ class Viewer:
     def _run(self) -> None:
         try:
             self._send_frames()
-        except Exception as error:  # Whatever happens to the viewer must not happen to the swarm.
-            self._report(f"the viewer shows no more: {error}")
+        except Exception as error:  # An error of the viewer must not end the flight.
+            self._report(f"the viewer has failed: {error}")
         self._ended.set()
 
     def _send_frames(self) -> None:
@@ -238,7 +238,7 @@ class Viewer:
         while (entries := self._frames.get()) is not None:
             write(stream, entries)
             if self._frames.empty() and time.monotonic() - flushed >= _BETWEEN_FLUSHES:
-                # Whole frames: cut in the middle, some aircraft would be drawn a moment behind the others.
+                # Only whole frames, so that all aircraft are drawn at the same time.
                 stream.flush(timeout_sec=0.0)
                 flushed = time.monotonic()
             sent += 1
@@ -247,11 +247,11 @@ class Viewer:
             if self._process.poll() is not None:
                 self._report(f"the viewer ended{self._exit_message()}; the flight and its recording go on")
                 break
-        # Until the viewer has read everything, or has ended.
+        # Blocks until the viewer has read everything, or has ended.
         stream.disconnect()
 
     def _wait_for_reader(self, stream: rr.RecordingStream) -> None:
-        """Let nothing pile up in the client, which would hold hundreds of MB before it holds back its caller."""
+        """Wait until the viewer has read everything; the client would buffer hundreds of MB before it blocks."""
         assert self._process is not None
         while self._process.poll() is None and not self._ended.is_set():
             try:
@@ -262,7 +262,7 @@ class Viewer:
                 time.sleep(0.1)
 
     def _listens(self) -> bool:
-        """Wait until the viewer listens; False if it will not."""
+        """Wait until the viewer listens; return False if it does not."""
         assert self._process is not None
         deadline = time.monotonic() + _START_TIMEOUT
         while time.monotonic() < deadline and not self._ended.is_set():
@@ -289,7 +289,7 @@ class Viewer:
 
 
 def viewer_program() -> Path:
-    """The viewer that the package rerun-sdk brings."""
+    """Return the viewer that the package rerun-sdk includes."""
     found = importlib.util.find_spec("rerun_cli")
     assert found is not None
     assert found.origin is not None

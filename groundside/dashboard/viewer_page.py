@@ -1,8 +1,8 @@
-"""The page of the web viewer, kept from talking to anybody but this machine.
+"""Serve the page of the web viewer with a policy that blocks all connections to other machines.
 
-Rerun's page sends usage statistics, asks for newer versions and loads fonts and examples from the Internet, and has no
-switch against it. A content security policy has: the browser then refuses whatever the page asks of other addresses.
-Rerun's server cannot be told to send one, so its answers pass through this one.
+Rerun's page sends usage statistics, checks for newer versions and loads fonts and examples from the Internet, and has
+no option to prevent this. With a content security policy the browser refuses such requests. Rerun's server cannot send
+one, so this server forwards its answers and adds it.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ __all__ = ["PageServer"]
 
 _LOOPBACK = "127.0.0.1"
 _FOREIGN_LINK = re.compile(rb'<link\b[^>]*href="https?:[^>]*>')
-"""Connections opened ahead of time are not subject to the policy."""
+"""Links that make the browser connect in advance, which the policy does not cover."""
 _HEADERS = ("Content-Type", "Content-Length", "rerun-final-length")
-"""Of Rerun's answers, those that the page needs; the last one feeds its progress display."""
+"""Headers of Rerun's answers that the page needs; the last one is for its progress display."""
 
 
 class PageServer:
-    """Serves the page of the viewer at ``viewer_port`` on ``port``, on loopback.
+    """Serves the viewer's page from ``viewer_port`` on ``port``, on loopback.
 
     Parameters
     ----------
     port : int
-        Where the browser finds the page.
+        Port for the browser.
     viewer_port : int
-        Where Rerun serves it.
+        Port of Rerun's server.
     data_port : int
-        The only other port that the page may talk to.
+        The only other port to which the page may connect.
 
     Raises
     ------
@@ -53,18 +53,18 @@ class PageServer:
         thread.start()
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop the server."""
         self._server.shutdown()
         self._server.server_close()
 
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
-    # A browser may hold a connection open: closing the server does not wait for it.
+    # A browser may keep a connection open; closing the server does not wait for it.
     block_on_close = False
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A browser that leaves in the middle of an answer is no error of the swarm's."""
+        """Ignore errors, such as of a browser that disconnects in the middle of an answer."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -97,4 +97,4 @@ class _Handler(BaseHTTPRequestHandler):
             viewer.close()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Requests for a page are nothing to print."""
+        """Print nothing for a request."""

@@ -1,4 +1,4 @@
-"""A flight with processes: started, watched, commanded, ended."""
+"""Start, watch, command and end a flight whose UAVs are processes."""
 
 import lazy_loader
 

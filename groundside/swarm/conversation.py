@@ -1,4 +1,4 @@
-"""Question and answer with the autopilots of a running swarm, over MAVLink: request until answered."""
+"""Exchange MAVLink requests and answers with the autopilots of a running swarm; repeat each request until answered."""
 
 from __future__ import annotations
 
@@ -26,34 +26,34 @@ _COMPONENT = dialect.MAV_COMP_ID_MISSIONPLANNER
 _NAN = math.nan
 _MAX_FLOAT32 = float(np.finfo(np.float32).max)
 _REASON_TIMEOUT = 0.1
-"""Wall time for which the reason of a refusal is waited for, s."""
+"""Longest wait for the text that gives the reason of a refusal, wall s."""
 
 
 class StationError(UserError):
-    """What was request for did not happen."""
+    """A command that was not carried out."""
 
 
 class NoAnswerError(StationError):
-    """The vehicle is not there, or does not answer."""
+    """The vehicle does not exist, or does not answer."""
 
 
 class RefusedError(StationError):
-    """The vehicle has answered that it will not."""
+    """The vehicle has refused the command."""
 
 
 class Conversation:
-    """Speaks with the UAVs of one swarm.
+    """Connection to the UAVs of one swarm.
 
     Parameters
     ----------
     swarm : str or Entry, optional
         Name of the running swarm as `ftcc ps` shows it; needed if several run.
     key : Path, optional
-        Key file; default: that of the swarm, where its links are signed.
+        Key file; default: that of the swarm, if its messages are signed.
     timeout : float
-        Wall time to wait for an answer before asking again, s; twice as long each time.
+        Wall time to wait for an answer before the request is repeated, s; doubled each time.
     tries : int
-        How often to ask.
+        Largest number of times that a request is sent.
 
     Raises
     ------
@@ -87,16 +87,16 @@ class Conversation:
 
     @property
     def uavs(self) -> tuple[int, ...]:
-        """Ids of the swarm's UAVs."""
+        """Return the ids of the swarm's UAVs."""
         return tuple(self._cards)
 
     @property
     def followers(self) -> tuple[int, ...]:
-        """Ids of its followers."""
+        """Return the ids of its followers."""
         return tuple(uav for uav, card in self._cards.items() if card.role == "follower")
 
     def card(self, uav: int) -> VehicleEntry:
-        """Where a UAV is.
+        """Return a UAV's entry in the registry.
 
         Raises
         ------
@@ -109,11 +109,11 @@ class Conversation:
         return self._cards[uav]
 
     def system(self, uav: int) -> int:
-        """MAVLink system id of a UAV."""
+        """Return the MAVLink system id of a UAV."""
         return self.card(uav).system
 
     def get(self, uav: int, name: str) -> float:
-        """The value in force.
+        """Return the current value of a parameter.
 
         Raises
         ------
@@ -123,14 +123,14 @@ class Conversation:
         return self._read(uav, name)[0]
 
     def set(self, uav: int, name: str, value: float) -> float:
-        """Set a parameter; the value in force, which is the one request for.
+        """Set a parameter and return its new value.
 
         Raises
         ------
         RefusedError
-            If the UAV does not take the value; the former one stays in force.
+            If the UAV refuses the value; the parameter keeps its former value.
         StationError
-            If no message can carry it.
+            If a MAVLink message cannot carry the value.
         """
         before, type_ = self._read(uav, name)
         if type_ == dialect.MAV_PARAM_TYPE_INT32:
@@ -146,16 +146,16 @@ class Conversation:
 
         if same(before):
             return before
-        message = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, type_)
+        request = dialect.MAVLink_param_set_message(self.system(uav), AUTOPILOT, name.encode(), raw, type_)
         self.texts[uav] = []
 
-        def is_answer(heard: Any) -> bool:
-            """With the value request for, or with the former one behind a reason: others answer earlier questions."""
-            if heard.get_type() != "PARAM_VALUE" or heard.param_id.upper() != name.upper():
+        def is_answer(message: Any) -> bool:
+            """Accept the requested value, or the former one after a STATUSTEXT; others answer earlier requests."""
+            if message.get_type() != "PARAM_VALUE" or message.param_id.upper() != name.upper():
                 return False
-            return bool(self.texts[uav]) or same(_value(heard))
+            return bool(self.texts[uav]) or same(_value(message))
 
-        after = _value(self._ask(uav, [message], is_answer, f"parameter {name}"))
+        after = _value(self._ask(uav, [request], is_answer, f"parameter {name}"))
         if not same(after):
             why = self._reason(uav)
             raise RefusedError(f"UAV {uav}: {name} = {value:.10g} is refused: {why}; the present value is {after:.10g}")
@@ -178,7 +178,7 @@ class Conversation:
         raise NoAnswerError(f"UAV {uav} sent only {len(found)} of its parameters")
 
     def _read(self, uav: int, name: str) -> tuple[float, int]:
-        """Value and type of a parameter."""
+        """Return value and type of a parameter."""
         request = dialect.MAVLink_param_request_read_message(
             self.system(uav), AUTOPILOT, name.encode()[:NAME_LENGTH], -1
         )
@@ -196,14 +196,14 @@ class Conversation:
         return _value(answer), int(answer.param_type)
 
     def command(self, uav: int, command: int, *parameters: float) -> Any:
-        """COMMAND_LONG with up to seven parameters, repeated until it is answered; the COMMAND_ACK.
+        """Send COMMAND_LONG with up to seven parameters until it is answered, and return the COMMAND_ACK.
 
         Raises
         ------
         NoAnswerError
             If there is no such UAV or it does not answer.
         RefusedError
-            If the answer is not "accepted"; with the reason that the UAV gives.
+            If the UAV does not accept the command; the text holds its reason.
         StationError
             If a parameter is infinite or beyond float32.
         """
@@ -222,7 +222,7 @@ class Conversation:
         return ack
 
     def request(self, uav: int, message: int) -> Any:
-        """A message of a UAV, by REQUEST_MESSAGE."""
+        """Request one message of a UAV with REQUEST_MESSAGE and return it."""
         name = dialect.mavlink_map[message].msgname
         request = dialect.MAVLink_command_long_message(
             self.system(uav), AUTOPILOT, dialect.MAV_CMD_REQUEST_MESSAGE, 0, message, _NAN, _NAN, _NAN, _NAN, _NAN, _NAN
@@ -230,9 +230,9 @@ class Conversation:
         return self._ask(uav, [request], lambda m: m.get_type() == name, name)
 
     def _ask(self, uav: int, requests: list[Any], is_answer: Callable[[Any], bool], what: str) -> Any:
-        """Send a request until it is answered; of several requests the next one each time."""
+        """Send ``requests`` one after the other, the last one again, until an answer arrives, and return it."""
         while select.select([self._socket], [], [], 0.0)[0]:
-            self.receive(uav, 0.0)  # what came before the question does not answer it
+            self.receive(uav, 0.0)  # discard what arrived before the request
         for n in range(self._tries):
             self.send(uav, requests[min(n, len(requests) - 1)])
             until = time.monotonic() + self._timeout * 2**n
@@ -244,11 +244,11 @@ class Conversation:
         raise NoAnswerError(f"UAV {uav} of swarm {self.entry.name} does not answer ({what}, {seconds:.1f} s)")
 
     def send(self, uav: int, message: Any) -> None:
-        """Send a message to a UAV, and wait for nothing."""
+        """Send a message to a UAV without waiting for an answer."""
         self._socket.sendto(self._codec.pack(message), (LOOPBACK, self.card(uav).port))
 
     def receive(self, uav: int, until: float) -> list[Any]:
-        """The messages of one UAV that come next; [] at the latest at ``until`` (monotonic, s)."""
+        """Return the next messages of one UAV; [] if none arrive before ``until`` (monotonic, s)."""
         if not select.select([self._socket], [], [], max(0.0, until - time.monotonic()))[0]:
             return []
         datagram, sender = self._socket.recvfrom(4096)
@@ -261,7 +261,7 @@ class Conversation:
         return messages
 
     def _reason(self, uav: int) -> str:
-        """What the UAV says about a refusal."""
+        """Return the UAV's reason for a refusal."""
         until = time.monotonic() + _REASON_TIMEOUT
         while not self.texts.get(uav) and time.monotonic() < until:
             self.receive(uav, until)
@@ -269,14 +269,14 @@ class Conversation:
 
 
 def _as_int32(name: str, value: float) -> int:
-    """A whole number that a message can carry."""
+    """Return a number as int32, or refuse it."""
     if not (math.isfinite(value) and value == int(value) and -(2**31) <= value < 2**31):
         raise StationError(f"{name} = {value:.10g}: must be a whole number from {-(2**31)} to {2**31 - 1}")
     return int(value)
 
 
 def as_float32(name: str, value: float) -> float:
-    """A number as a message can carry it: what it rounds to.
+    """Round a number to float32, as MAVLink messages carry it.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def as_float32(name: str, value: float) -> float:
 
 
 def _value(message: Any) -> float:
-    """The value in a PARAM_VALUE."""
+    """Return the value in a PARAM_VALUE."""
     if message.param_type == dialect.MAV_PARAM_TYPE_INT32:
         return float(struct.unpack("<i", struct.pack("<f", message.param_value))[0])
     return as_typed(message.param_value)

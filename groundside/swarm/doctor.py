@@ -1,8 +1,8 @@
-"""Whether this machine can fly a scenario, and how fast: measured by flying it for some seconds, not by a rule.
+"""Measure whether this machine can fly a scenario, and how fast, by flying it for a few seconds.
 
-The very scenario takes off in lockstep, as fast as it can, with all its processes, its mesh and its recording, but
-without a viewer and without anybody listening on MAVLink; what it reaches within some seconds is what a whole flight
-reaches. Where it falls short of the speed asked for, the limit and what would help are those of `pace`.
+The scenario flies in lockstep, as fast as possible, with all its processes, mesh and recording, but without a viewer
+and without MAVLink listeners. A whole flight reaches the pace of these seconds. If it is below the requested speed, the
+limit and the advice come from `pace`.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ __all__ = ["Finding", "Prediction", "describe_machine", "examine", "judge_predic
 _MEASURED = 3.5
 """Wall time over which a flight is measured, s."""
 _SETTLED = 0.7
-"""Wall time after which everybody has found its pace, s."""
+"""Wall time after which the pace is steady, s."""
 _LEAST_MEASURED = 1.0
-"""Wall time that is enough where a scenario is over sooner, s."""
+"""Shortest measurement if the scenario is over sooner, wall s."""
 _LONGEST = 36_000.0
-"""Simulated time to which a short scenario is extended, so that it lasts until it is stopped, s."""
+"""Simulated duration to which a scenario is extended, so that it flies until it is stopped, s."""
 _SAMPLE_PERIOD = 0.25
 """Wall time between two samples, s."""
 _RESERVE = 1.15
-"""A speed that is exceeded by less than this factor is held only while nothing else happens on the machine."""
+"""Factor by which the pace must exceed the requested speed, so that other programs do not disturb it."""
 _UNUSED_LISTENERS = (("127.0.0.1", 9), ("127.0.0.1", 9))
-"""As many listeners as a flight has; nobody listens on this port (discard)."""
+"""As many listeners as in a flight; port 9 (discard) is unused."""
 
 
 class Finding(NamedTuple):
-    """A row of what the doctor says."""
+    """One row of the doctor's table."""
 
     what: str
     found: str
@@ -56,19 +56,19 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """How a flight would go on this machine."""
+    """Measured performance of a flight on this machine."""
 
     pack: int
     processes: int
-    """Of vehicles and autopilots."""
+    """Number of vehicle and autopilot processes."""
     pace: Pace
-    """As fast as possible; the factor is nan if the flight was too short to tell."""
+    """Pace when flying as fast as possible; the factor is nan if the flight was too short."""
     memory: float
-    """Of all processes together, what they share counted once, bytes."""
+    """Memory of all processes, shared memory counted once, bytes."""
     start: float
-    """Wall time until everybody was ready, s."""
+    """Time until all processes were ready, wall s."""
     problem: str = ""
-    """Why it did not fly."""
+    """Why it did not fly; empty if it did."""
 
 
 def examine(
@@ -77,13 +77,13 @@ def examine(
     seconds: float = _MEASURED,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Finding]:
-    """What this machine has, and how fast it flies ``mission``: once as ``--pack auto``, once unpacked.
+    """Examine this machine, and measure how fast it flies ``mission``: once with ``--pack auto``, once unpacked.
 
     Parameters
     ----------
-    speed : times real time that are wanted; inf: whatever can be had.
-    seconds : wall time over which either is measured, after its start.
-    progress : called with what is done at the moment, which may take a minute.
+    speed : wanted speed, times real time; inf: as fast as possible.
+    seconds : wall time over which each flight is measured, after its start.
+    progress : called with the current step, which may take a minute.
     """
     from ftcc.groundside.swarm.launcher import automatic_pack
 
@@ -99,7 +99,7 @@ def examine(
 
 
 def describe_machine(mission: Mission) -> list[Finding]:
-    """What there is: interpreter, cores, ports, compiled code, and what only some tests need."""
+    """Return interpreter, cores, memory, ports, compiled code, and programs that only some tests need."""
     from ftcc.link.compiled import cache_folder
 
     cores = usable_cores()
@@ -139,11 +139,11 @@ def _ports(mission: Mission) -> Finding:
 
 
 def judge_prediction(what: str, flown: Prediction, speed: float) -> Finding:
-    """What a prediction means for who wants ``speed``."""
+    """Compare a prediction with the wanted ``speed``."""
     if flown.problem:
         return Finding(what, "does not fly", flown.problem)
     if math.isnan(flown.pace.factor):
-        return Finding(what, "too short to tell", "give it a longer duration")
+        return Finding(what, "too short to measure", "give it a longer duration")
     found = (
         f"{flown.pace.factor:.1f} times real time, {flown.processes} processes, {flown.memory / 1e9:.1f} GB, "
         f"ready after {flown.start:.0f} s"
@@ -160,16 +160,16 @@ def judge_prediction(what: str, flown: Prediction, speed: float) -> Finding:
 
 @dataclass
 class _Watch:
-    """Watches a flight from within: samples it, and has it stopped when it has been seen for long enough."""
+    """Samples a flight from within, and stops it after enough samples."""
 
     folder: Path
     meter: PaceMeter
     seconds: float
     duration: float
-    """Of the scenario, simulated s."""
+    """Duration of the scenario, simulated s."""
     created: float = field(default_factory=time.monotonic)
     begun: float = math.inf
-    """When everybody was ready (wall s, monotonic)."""
+    """When all processes were ready (monotonic, s)."""
     processes: list[tuple[str, int, Kind]] = field(default_factory=list)
     memory: float = 0.0
     samples: list[Sample] = field(default_factory=list)
@@ -177,38 +177,38 @@ class _Watch:
     problems: list[str] = field(default_factory=list)
 
     def on_start(self, _address: str | None) -> None:
-        """Everybody is ready."""
+        """Record that all processes are ready."""
         self.begun = time.monotonic()
 
     def on_event(self, event: Event) -> None:
-        """Something happened."""
+        """Record an error of the flight."""
         if event.severity == "error" and event.t <= self.duration:
             self.problems.append(event.text.splitlines()[0])
 
     def on_progress(self, t: float, _pace: Pace) -> None:
-        """The flight has come to ``t``."""
+        """Take a sample at simulated time ``t``; stop the flight after enough of them."""
         now = time.monotonic()
         if self.enough or now - self.begun < _SETTLED:
             return
         if not self.processes:
             self.processes = processes_of(self.folder, os.getpid())
             self.memory = _used_memory()
-            return  # that took its time: ``t`` is old
+            return  # this took a while, so that ``t`` is old
         if not self.samples or now - self.samples[-1].wall >= _SAMPLE_PERIOD:
             self.samples.append(self.meter.sample(now, t, self.processes, [], os.getpid()))
         if now - self.samples[0].wall >= (self.seconds if t <= self.duration else _LEAST_MEASURED):
             self.enough = True
-            # From a thread of its own: the one that flies has to answer.
+            # In a separate thread, because this one has to answer the command.
             threading.Thread(target=_stop_swarm, args=(self.folder.name,), daemon=True).start()
 
 
 def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Prediction:
-    """Fly ``mission``, look at it for some ``seconds`` of wall time, and tell how a whole flight would go.
+    """Fly ``mission``, measure it over ``seconds`` of wall time, and predict how a whole flight would go.
 
     Raises
     ------
     KeyboardInterrupt
-        If the flight was stopped by somebody else.
+        If the flight was stopped from outside.
     """
     from ftcc.groundside.swarm.flight import FlightOptions, fly_swarm
     from ftcc.groundside.swarm.launcher import automatic_pack
@@ -236,18 +236,18 @@ def predict(mission: Mission, pack: int, seconds: float = _MEASURED) -> Predicti
 
 
 def _stop_swarm(name: str) -> None:
-    """End a running swarm in order."""
+    """Stop a running swarm."""
     from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 
     try:
         ask_swarm(find_swarm(name), "stop")
     except (LookupError, OSError) as error:
-        # It has come to its end by itself in this very moment.
+        # It ended by itself in the meantime.
         print(f"ftcc doctor: {error}", file=sys.stderr)
 
 
 def _used_memory() -> float:
-    """What this process and all that it has started take, shared memory counted once, bytes."""
+    """Return the memory of this process and its descendants, shared memory counted once, bytes."""
     total = 0.0
     for process in (psutil.Process(), *psutil.Process().children(recursive=True)):
         try:

@@ -1,4 +1,4 @@
-"""A flight with processes: swarm, station, recording and dashboard together, from ready to the merged run."""
+"""Fly a swarm of processes with its station, recording and dashboard, and leave a complete run."""
 
 from __future__ import annotations
 
@@ -33,39 +33,41 @@ if TYPE_CHECKING:
 __all__ = ["Clock", "FlightOptions", "Viewer", "fly_swarm"]
 
 Clock = Literal["lockstep", "wall"]
-"""What a tick waits for: for everybody, then for the wall clock; or for the wall clock alone."""
+"""What a tick waits for: all processes and then the wall clock, or the wall clock alone."""
 Viewer = Literal["web", "native", "none"]
-"""Where a swarm is shown."""
+"""Kind of viewer."""
 
 _POLL_PERIOD = 0.02
-"""Longest wall time between two readings of the telemetry, s."""
+"""Longest time between two readings of the telemetry, wall s."""
 _START_TIMEOUT = 300.0
-"""Wall time that processes may need to get ready: the first start compiles, s."""
+"""Time for all processes to get ready, wall s; the first start compiles."""
 _END_TIMEOUT = 5.0
-"""Wall time that processes may need to end by themselves, s."""
+"""Time for all processes to end by themselves, wall s."""
 
 
 @dataclass(frozen=True)
 class FlightOptions:
-    """How to fly, as opposed to what."""
+    """How to fly a mission: clock, processes, viewer, links to the ground."""
 
     folder: Path
     lockstep: bool = True
-    """All wait for each other; otherwise each flies by the wall clock."""
+    """Whether processes wait for each other; otherwise each follows the wall clock."""
     speed: float = 1.0
-    """Simulated seconds per second, at most; inf: as fast as the computer can."""
+    """Largest number of simulated seconds per second; inf: as fast as possible."""
     pack: int = 1
+    """Vehicles per process."""
     held: bool = False
+    """Hold the swarm before the first tick."""
     viewer: Viewer = "none"
     open_browser: bool = False
     record_view: bool = True
     """Write ``swarm.rrd``."""
     listeners: tuple[Address, ...] = LISTENERS
-    """Where other ground stations may listen."""
+    """Addresses to which telemetry for other ground stations is sent."""
     key: Path | None = None
-    """Key file for signed links to the ground."""
+    """Key file for signed MAVLink messages to the ground."""
     id_offset: int = 0
-    """What UAVs' ids have added as MAVLink systems towards the ground."""
+    """MAVLink system id of a UAV minus its id."""
 
 
 def fly_swarm(
@@ -81,17 +83,17 @@ def fly_swarm(
     Parameters
     ----------
     report : called with every event.
-    progress : called with the simulated time and the pace, up to ten times a second.
-    started : called once everybody is ready, with the viewer's address or None.
+    progress : called with the simulated time and the pace, up to ten times per second.
+    started : called once when all processes are ready, with the viewer's address or None.
 
-    Ctrl-C and SIGTERM end the flight in order.
+    Ctrl-C and SIGTERM end the flight in an orderly way.
 
     Raises
     ------
     TooFewFilesError
-        If processes may not open as many files as they need: nothing is started.
+        If the system does not allow enough open files; nothing has been started.
     TimeoutError
-        If not all processes get ready.
+        If a process does not get ready.
     """
     provide_files(mission, options.pack, len(options.listeners))
     folder = options.folder
@@ -103,9 +105,42 @@ def fly_swarm(
     def on_event(event: Event) -> None:
         flight.log_event(event)
 
+    # The fork server must exist before this process opens anything.
+    swarm = _start_swarm(mission, options, ports, run_started, on_event)
+    station = _station(mission, options, ports, run_started)
+    flight = FlightInProgress(
+        mission, swarm, station, None, None, EventLog(folder / "events.jsonl"), report, _pacing(mission, options)
+    )
+    control = None
+    wall_flown = 0.0
+    """Duration of the flight, wall s."""
+    with _stop_on_signals(swarm):
+        try:
+            flight.dashboard = _dashboard(mission, options, ports)
+            address = flight.dashboard.address if flight.dashboard else None
+            control = ControlSocket(_entry(mission, options, ports, address), flight.handle_command)
+            flight.feed = Feed(folder.name)
+            _wait_until_ready(flight, control)
+            started(address)
+            wall_flown = _fly(flight, control, progress)
+        finally:
+            _end_processes(flight)
+            flight.judge_flight()
+            if control:
+                control.close()
+            flight.close()
+            ports.release()
+    flight.log_end(wall_flown)
+    return swarm.outcome
+
+
+def _start_swarm(
+    mission: Mission, options: FlightOptions, ports: PortBlock, run_started: float, on_event: Callable[[Event], None]
+) -> Swarm:
+    """Start all processes of the swarm."""
     swarm = Swarm(
         mission,
-        folder,
+        options.folder,
         ports,
         lockstep=options.lockstep,
         speed=options.speed,
@@ -117,48 +152,34 @@ def fly_swarm(
         started=run_started,
         on_event=on_event,
     )
-    # The fork server must exist before this process opens anything.
     swarm.start()
-    station = _station(mission, options, ports, run_started)
-    flight = FlightInProgress(
-        mission, swarm, station, None, None, EventLog(folder / "events.jsonl"), report, _pacing(mission, options)
-    )
-    control = None
-    wall_flown = 0.0
-    """Wall time of the flight, s."""
-    with _stopping_on_signals(swarm):
-        try:
-            flight.dashboard = _dashboard(mission, options, ports)
-            address = flight.dashboard.address if flight.dashboard else None
-            control = ControlSocket(_entry(mission, options, ports, address), flight.handle_command)
-            flight.feed = Feed(folder.name)
-            _wait_until_ready(flight, control)
-            started(address)
-            swarm.go()
-            begun = time.monotonic()
-            while not swarm.over:
-                _poll(flight, control, progress)
-            wall_flown = time.monotonic() - begun
-            station.read()
-            flight.refreshed = 0.0
-            flight.refresh(progress)
-        finally:
-            swarm.stop()
-            until = time.monotonic() + _END_TIMEOUT
-            while not swarm.over and time.monotonic() <= until:
-                _poll(flight, None, _ignore_progress)
-            swarm.release()
-            flight.judge_flight()
-            if control:
-                control.close()
-            flight.close()
-            ports.release()
-    flight.log_end(wall_flown)
-    return swarm.outcome
+    return swarm
+
+
+def _fly(flight: FlightInProgress, control: ControlSocket, progress: Progress) -> float:
+    """Fly until every process has ended, and return the duration in wall s."""
+    flight.swarm.go()
+    begun = time.monotonic()
+    while not flight.swarm.over:
+        _poll(flight, control, progress)
+    wall_flown = time.monotonic() - begun
+    flight.station.read()
+    flight.refreshed = 0.0
+    flight.refresh(progress)
+    return wall_flown
+
+
+def _end_processes(flight: FlightInProgress) -> None:
+    """Stop the processes that still fly, and wait until all have ended."""
+    flight.swarm.stop()
+    until = time.monotonic() + _END_TIMEOUT
+    while not flight.swarm.over and time.monotonic() <= until:
+        _poll(flight, None, _ignore_progress)
+    flight.swarm.release()
 
 
 def _station(mission: Mission, options: FlightOptions, ports: PortBlock, run_started: float) -> Monitor:
-    """What hears all vehicles and writes the telemetry's log."""
+    """Return the monitor that receives all telemetry and logs it."""
     signals = [signal_.name for signal_ in mission.scheme.signals]
     uavs = [spec.uav for spec in mission.vehicles]
     sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
@@ -173,7 +194,7 @@ def _pacing(mission: Mission, options: FlightOptions) -> Pacing:
 
 
 def _wait_until_ready(flight: FlightInProgress, control: ControlSocket) -> None:
-    """Until all processes are ready, or somebody stops the swarm."""
+    """Wait until all processes are ready, or the swarm is stopped."""
     swarm = flight.swarm
     until = time.monotonic() + _START_TIMEOUT
     while not swarm.ready and swarm.stopping_since is None:
@@ -184,8 +205,8 @@ def _wait_until_ready(flight: FlightInProgress, control: ControlSocket) -> None:
 
 
 def _poll(flight: FlightInProgress, control: ControlSocket | None, progress: Progress) -> None:
-    """Wait a little, then take in what processes, vehicles and the command line report, and show it."""
-    # The station hears something all the time: it is read now and then.
+    """Wait briefly, then handle messages of processes, telemetry and commands, and update the dashboard."""
+    # Telemetry arrives all the time: it does not end the wait.
     wait([flight.swarm.fileno(), *([control.fileno()] if control else [])], _POLL_PERIOD)
     flight.swarm.poll()
     flight.station.read()
@@ -195,7 +216,7 @@ def _poll(flight: FlightInProgress, control: ControlSocket | None, progress: Pro
 
 
 def _ignore_progress(_t: float, _pace: Pace) -> None:
-    """Nobody looks at the progress."""
+    """Do nothing."""
 
 
 def _entry(mission: Mission, options: FlightOptions, ports: PortBlock, address: str | None) -> Entry:
@@ -223,7 +244,7 @@ def _entry(mission: Mission, options: FlightOptions, ports: PortBlock, address: 
 
 
 def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> Any:
-    """The dashboard, or None where nothing is to be shown or recorded."""
+    """Return the dashboard, or None if nothing is to be shown or recorded."""
     recording = options.folder / "swarm.rrd" if options.record_view else None
     if options.viewer == "none" and recording is None:
         return None
@@ -239,8 +260,8 @@ def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> An
 
 
 @contextlib.contextmanager
-def _stopping_on_signals(swarm: Swarm) -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the flight in order; elsewhere than in the main thread signals are not ours."""
+def _stop_on_signals(swarm: Swarm) -> Iterator[None]:
+    """Stop the swarm on Ctrl-C and SIGTERM; do nothing outside of the main thread, which alone handles signals."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

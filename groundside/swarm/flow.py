@@ -1,4 +1,4 @@
-"""The flow of simulated time of a running swarm: hold it at one tick, step it, let it go on, change its speed."""
+"""Control the simulated time of a running swarm: hold, step, resume, change the speed."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from ftcc.link.gate import Limit, Pace
 __all__ = ["START", "Flow", "FlowError"]
 
 START = 0.05
-"""Wall time between word and deed, s."""
+"""Wall time between sending a pace and its first tick, s."""
 
 
 class FlowError(ValueError):
-    """What is asked for is not possible now."""
+    """A request that is not possible in the current state."""
 
 
 class Flow:
-    """Holds all vehicle processes before the same tick, and lets them go together.
+    """Holds all vehicle processes before the same tick, and resumes them together.
 
     Parameters
     ----------
     period : control period, s.
-    speed : simulated seconds per second, at most; inf, in ``lockstep``: as fast as possible.
+    speed : largest number of simulated seconds per second; inf (only in ``lockstep``): as fast as possible.
     held : start held before tick 0.
-    send : says something to all processes.
-    flying : names of the vehicle processes that still fly.
+    send : sends a message to all processes.
+    flying : returns the names of the vehicle processes that still fly.
     """
 
     def __init__(
@@ -46,26 +46,26 @@ class Flow:
         self._send = send
         self._flying = flying
         self._ticks: dict[str, int] = {}
-        """Before which tick each process is held."""
+        """Tick before which each process is held."""
         self._pace = Pace(0.0, 0, speed)
         self.state: Literal["flying", "holding", "held"] = "held" if held else "flying"
         self.tick = 0
-        """Before which the swarm is held."""
+        """Tick before which the swarm is held."""
 
     def begin(self) -> tuple[Pace, Limit]:
-        """How the flight begins."""
+        """Start the clock and return pace and limit of the first ticks."""
         self._pace = Pace(time.monotonic() + START, 0, self.speed)
         return self._pace, Limit(-1 if self.state == "held" else None)
 
     def pause(self) -> None:
-        """Hold everybody, wherever they are; they are brought to one tick as they answer."""
+        """Hold all processes where they are; once all have answered, bring them to the same tick."""
         if self.state == "flying":
             self.state = "holding"
             self._ticks.clear()
             self._send(Limit(-1))
 
     def mark_held(self, name: str, tick: int) -> None:
-        """A process is held before a tick."""
+        """Record that a process is held before a tick."""
         self._ticks[name] = tick
         flying = set(self._flying())
         if self.state != "holding" or not flying <= set(self._ticks):
@@ -78,7 +78,7 @@ class Flow:
             self._continue_from(min(ticks), Limit(self.tick - 1))
 
     def step(self, ticks: int) -> None:
-        """Fly so many ticks and hold again.
+        """Fly a number of ticks and hold again.
 
         Raises
         ------
@@ -90,37 +90,37 @@ class Flow:
         self._continue_from(self.tick, Limit(self.tick + ticks - 1))
 
     def resume(self) -> None:
-        """Let a held swarm fly.
+        """Resume a held swarm.
 
         Raises
         ------
         FlowError
-            If it is not held.
+            If the swarm is not held.
         """
         self._require_held("resume")
         self.state = "flying"
         self._continue_from(self.tick, Limit(None))
 
     def set_speed(self, speed: float) -> None:
-        """Change the pace, in flight or for when it goes on.
+        """Change the speed, at once or, if the swarm is held, when it resumes.
 
         Raises
         ------
         FlowError
-            If it is none that the swarm's clock can keep.
+            If the speed is infinite and the swarm is not in lockstep.
         """
         if math.isinf(speed) and not self.lockstep:
             raise FlowError(
-                "a swarm on the wall clock needs a speed; only a swarm in lockstep can fly as fast as possible"
+                "a swarm on the wall clock needs a finite speed; only a swarm in lockstep flies as fast as possible"
             )
         self.speed = speed
         if self.state != "flying":
             return
         if self.lockstep:
-            # Nobody knows how far the swarm has come: each goes on from where it is, and waits for the others.
+            # The current tick is not known here: each process continues from its own, and waits for the others.
             self._pace = Pace(time.monotonic() + START, None, speed)
         else:
-            # From one tick on that is due soon, the same for all.
+            # All processes change at the same tick, which is due soon.
             begun = self._pace.tick or 0
             ahead = (time.monotonic() + START - self._pace.wall) * self._pace.speed / self.period
             tick = begun + max(0, int(ahead))

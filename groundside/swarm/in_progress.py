@@ -1,4 +1,4 @@
-"""A flight in progress: its events, its pictures, its pace, commands from the command line, and its verdict."""
+"""Handle a flight in progress: its events, snapshots, pace, commands from the command line, and verdict."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 __all__ = ["FlightInProgress", "Progress"]
 
 Progress = Callable[[float, Pace], None]
-"""Called with the simulated time (s) that a flight has come to, and its pace."""
+"""Called with the current simulated time (s) of a flight, and its pace."""
 
 _REFRESH = 0.1
-"""Least period of the dashboard and of progress, wall s."""
+"""Shortest period between updates of the dashboard and of the progress, wall s."""
 
 
 @dataclass
 class FlightInProgress:
-    """A flight with all that belongs to it, and what is done with it now and then."""
+    """A flight: its processes, its station, its dashboard, feed and log."""
 
     mission: Mission
     swarm: Swarm
@@ -44,7 +44,10 @@ class FlightInProgress:
     refreshed: float = 0.0
 
     def log_event(self, event: Event) -> None:
-        """An event to the log, the dashboard and the caller; at the present simulated time if it has none."""
+        """Send an event to the log, the dashboard and the caller.
+
+        An event without a time is stamped with the current simulated time.
+        """
         stamped = event if event.t >= 0.0 else replace(event, t=self.station.t)
         extra = {"who": event.who, "outcome": event.outcome} if event.who or event.outcome else {}
         self._write(stamped, extra)
@@ -55,17 +58,17 @@ class FlightInProgress:
         writable = not self.log.trouble
         self.log.write(event.t, event.text, event.uav, event.severity, **extra)
         if writable and self.log.trouble:
-            self.log_event(Event(event.t, "error", f"events are not logged any further: {self.log.trouble}"))
+            self.log_event(Event(event.t, "error", f"event logging stopped: {self.log.trouble}"))
 
     def log_scheduled_events(self) -> None:
-        """Note the scenario's own events as their time comes."""
+        """Log the scenario's events whose time has come."""
         while self.next_event < len(self.mission.events) and self.mission.events[self.next_event][0] <= self.station.t:
             t, uav, severity, text = self.mission.events[self.next_event]
             self.log_event(Event(t, severity, text, uav))
             self.next_event += 1
 
     def measure_pace(self) -> None:
-        """Measure how fast the swarm flies, and say where it is too slow."""
+        """Measure the pace, and log a warning if the swarm is too slow."""
         flown = round(self.station.t / self.mission.timing.period) * len(self.mission.vehicles)
         text = self.pacing.measure(
             time.monotonic(),
@@ -78,7 +81,7 @@ class FlightInProgress:
             self.log_event(Event(-1.0, "warning", text))
 
     def refresh(self, progress: Progress) -> None:
-        """Draw the swarm, at most ten times a second."""
+        """Log events, measure the pace and draw the swarm, at most ten times per second."""
         if time.monotonic() - self.refreshed < _REFRESH:
             return
         self.refreshed = time.monotonic()
@@ -88,7 +91,7 @@ class FlightInProgress:
         if self.swarm.flow.state == "flying" and self.station.t > 0.0:
             self.measure_pace()
         progress(self.station.t, self.pacing.pace)
-        # The first picture sets the scale: it waits for everybody, but not for ever.
+        # The first snapshot sets the scale: wait for all UAVs, but no longer than 1 s.
         if not (self.station.complete or self.station.t > 1.0):
             return
         snapshot = replace(self.station.snapshot(), pace=self.pacing.pace)
@@ -100,17 +103,15 @@ class FlightInProgress:
                 self.log_event(problem)
 
     def judge_flight(self) -> None:
-        """Say how the flight went, in its log, its folder and the dashboard, where anything was recorded."""
+        """Judge the flight; write the verdict to the log, the run's folder and the dashboard."""
         run = Run(self.swarm.folder)
         try:
             verdict = judge(run, self.mission, run.lost)
         except RunError:
-            # What has been recorded cannot be read, or is nothing: the log says why.
+            # The recording is empty or unreadable: the log has the reason.
             return
         except OSError as error:
-            what = (
-                f"not merged into signals.parquet: {error.strerror or error}; `ftcc report` does it once there is room"
-            )
+            what = f"not merged into signals.parquet: {error.strerror or error}; free disk space and run `ftcc report`"
             self.log_event(Event(-1.0, "error", f"the processes' recordings are {what}"))
             return
         self.swarm.outcome.verdict = verdict
@@ -129,12 +130,12 @@ class FlightInProgress:
             self.dashboard.log(snapshot)
 
     def handle_command(self, command: str, arguments: Mapping[str, Any]) -> dict[str, Any] | None:
-        """A command from the control socket.
+        """Execute a command from the control socket and return its answer.
 
         Raises
         ------
         ValueError
-            With what is wrong with it.
+            If the command is unknown or an argument is wrong.
         """
         flow, text = self.swarm.flow, ""
         match command:
@@ -167,11 +168,11 @@ class FlightInProgress:
         return None
 
     def log_end(self, wall_flown: float) -> None:
-        """How fast the swarm flew, ``wall_flown`` seconds of wall time in all, as the last entry of the log."""
+        """Write the last entry of the log: late ticks and pace over ``wall_flown`` seconds of wall time."""
         outcome, pace = self.swarm.outcome, self.pacing.pace
         if self.station.foreign_datagrams:
             self.log.write(
-                self.station.t, f"dropped {self.station.foreign_datagrams} datagrams of strangers at the station"
+                self.station.t, f"dropped {self.station.foreign_datagrams} datagrams from other ports at the station"
             )
         self.log.write(
             self.station.t,
@@ -187,7 +188,7 @@ class FlightInProgress:
         self.log.close()
 
     def close(self) -> None:
-        """Close whatever shows or hears the swarm."""
+        """Close the station, the feed and the dashboard."""
         self.station.close()
         if self.feed:
             self.feed.close()

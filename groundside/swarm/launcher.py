@@ -1,7 +1,7 @@
-"""The launcher: starts a swarm's processes, lets them go together, watches over them, and ends them.
+"""Launch a swarm: start its processes together, monitor them, and end them.
 
-It knows processes, ports and pipes, not physics. Children are forked from a fork server that holds everything compiled;
-each has a log, and its last tail are reported if it dies.
+The launcher handles processes, ports and pipes, not physics. Children are forked from a fork server that has loaded all
+compiled code. Each child has a log; if it dies, the end of the log is reported.
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ if TYPE_CHECKING:
 __all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
 
 _END_TIMEOUT = 1.2
-"""Wall time that processes have to end by themselves, s."""
+"""Time for processes to end by themselves, wall s."""
 _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
-"""Exit codes after a stop that are nobody's death: also SIGTERM to the whole group, and a fork server gone first."""
+"""Exit codes that are normal after a stop, also for SIGTERM to the process group or a fork server that ended first."""
 _TAIL_LINES = 12
 """Lines of a dead process's log that are reported."""
 _SCHEME_VARIABLE, _PLANT_VARIABLE = "FTCC_PRELOAD_SCHEME", "FTCC_PRELOAD_PLANT"
-"""Tell the fork server what to load, see `preload`."""
+"""Environment variables that tell the fork server what to load, see `preload`."""
 
 
 def automatic_pack(uavs: int) -> int:
-    """Vehicles per process that keep every core busy and wake as few processes as possible."""
+    """Return the number of vehicles per process that uses every core with as few processes as possible."""
     pairs = max(1, (os.cpu_count() or 2) // 2)
     return max(1, -(-uavs // pairs))
 
 
 Role = Literal["vehicle", "autopilot"]
-"""What a process flies."""
+"""Kind of a process."""
 
 
 @dataclass
 class Child:
-    """A process of the swarm."""
+    """One process of the swarm."""
 
     name: str
     uavs: tuple[int, ...]
@@ -68,14 +68,14 @@ class Child:
     dead: bool = False
 
     def send(self, message: Any) -> None:
-        """Say something; a child that is gone will be noticed by its sentinel."""
+        """Send a message; a child that has ended is detected by its sentinel."""
         with contextlib.suppress(BrokenPipeError, ConnectionResetError, OSError):
             self.pipe.send(message)
 
 
 @dataclass
 class Outcome:
-    """How a flight went."""
+    """Result of a flight."""
 
     died: list[str] = field(default_factory=list)
     """Names of processes that died."""
@@ -85,21 +85,21 @@ class Outcome:
     ticks: int = 0
     """Ticks flown by all vehicles together."""
     flown: int = 0
-    """The last tick of the one that flew longest."""
+    """Largest number of ticks that any UAV flew."""
     stopped: bool = False
-    """Ended before its time, on request."""
+    """Whether the flight was ended early on request."""
     verdict: Verdict | None = None
-    """None where nothing was recorded."""
+    """None if nothing was recorded."""
 
     @property
     def ok(self) -> bool:
-        """No process died and no aircraft was lost."""
+        """Return whether no process died and no aircraft was lost."""
         return not self.died and not self.lost
 
 
 @contextlib.contextmanager
 def no_main_module() -> Iterator[None]:
-    """Keep children from importing the program that started us."""
+    """Keep children from importing the program that started this process."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = types.ModuleType("__main__")
     try:
@@ -116,15 +116,15 @@ class Swarm:
     mission : the resolved scenario.
     folder : the run's folder.
     ports : a reserved block.
-    lockstep : wait for each other, and for the clock; otherwise for the clock alone.
-    speed : simulated seconds per second, at most; inf: as fast as possible, in lockstep.
+    lockstep : whether processes wait for each other and the clock; otherwise for the clock alone.
+    speed : largest number of simulated seconds per second; inf (only in lockstep): as fast as possible.
     pack : vehicles per process.
-    held : stay at the first tick until `resume`.
-    listeners : where other ground stations may listen.
-    key : key file for signed links to the ground.
-    id_offset : what UAVs' ids have added as MAVLink systems towards the ground.
-    started : Unix time that counts as simulated time 0, s; default: now.
-    on_event : called with everything worth showing.
+    held : hold before the first tick until `Flow.resume`.
+    listeners : addresses to which telemetry for other ground stations is sent.
+    key : key file for signed MAVLink messages to the ground.
+    id_offset : MAVLink system id of a UAV minus its id.
+    started : Unix time of simulated time 0, s; default: now.
+    on_event : called with every event.
     """
 
     def __init__(
@@ -172,8 +172,8 @@ class Swarm:
 
     def start(self) -> None:
         """Start all processes."""
-        # Imported by name only when a child needs them: the launcher itself flies nothing.
-        from ftcc.airside.process import main as run_autopilots
+        # Imported here, because only the children need them.
+        from ftcc.airside.process import run as run_autopilots
         from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -199,8 +199,8 @@ class Swarm:
         span = f"{group[0]}" if len(group) == 1 else f"{group[0]}-{group[-1]}"
         name = f"uav{span}-{kind}"
         ours, theirs = context.Pipe()
-        # A daemon: Ctrl-C while processes start, or whatever ends the launcher before it has told them to stop, ends
-        # them. Otherwise it would wait for them at its exit, and they for it, for ever.
+        # A daemon process ends with the launcher, even if the launcher ends before it has sent a stop, as with Ctrl-C
+        # while processes start. Otherwise each would wait for the other forever.
         process = context.Process(
             target=process_main, args=(name, theirs, self.setting, run, specs), name=name, daemon=True
         )
@@ -213,45 +213,45 @@ class Swarm:
 
     @property
     def ready(self) -> bool:
-        """Whether every living process waits for the go."""
+        """Return whether every living process waits for the start of the flight."""
         return all(child.ready or child.dead for child in self.children)
 
     @property
     def over(self) -> bool:
-        """Whether every process has flown its ticks or died."""
+        """Return whether every process has flown its ticks or died."""
         return all(child.ended or child.dead for child in self.children)
 
     def go(self) -> None:
-        """Begin the flight: one epoch for all."""
+        """Start the flight, at the same time for all processes."""
         self.send_to_all(Go(*self.flow.begin()))
 
     @property
     def flying(self) -> list[Child]:
-        """The processes that still fly."""
+        """Return the processes that still fly."""
         return [child for child in self.children if not (child.ended or child.dead)]
 
     def _flying_vehicles(self) -> list[str]:
-        """Names of the vehicle processes that still fly."""
+        """Return the names of the vehicle processes that still fly."""
         return [child.name for child in self.flying if child.kind == "vehicle"]
 
     def send_to_all(self, message: Any) -> None:
-        """Say something to every process."""
+        """Send a message to every process."""
         for child in self.children:
             child.send(message)
 
     def stop(self) -> None:
-        """End the flight now, in order."""
+        """End the flight now, in an orderly way."""
         if self.stopping_since is None:
             self.stopping_since = time.monotonic()
             self.outcome.stopped = not self.over
             self.send_to_all(Stop())
 
     def fileno(self) -> int:
-        """A descriptor that can be read where a process has said something, or has died."""
+        """Return a descriptor that is readable if a process has sent a message or has ended."""
         return self._selector.fileno()
 
     def poll(self) -> None:
-        """Take in what the processes said, and notice who died."""
+        """Handle the messages of the processes, and detect processes that have ended."""
         for child in {key.data.name: key.data for key, _ in self._selector.select(0.0)}.values():
             with contextlib.suppress(EOFError, ConnectionResetError):
                 while child.pipe.poll():
@@ -282,7 +282,7 @@ class Swarm:
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 
     def _handle_exit(self, child: Child) -> None:
-        """A process is gone: say so, end its partner, and let nobody wait for it."""
+        """Handle the end of a process: if unexpected, report it, stop its partner, and make no other wait for it."""
         child.dead = True
         for source in (child.pipe, child.process.sentinel):
             self._selector.unregister(source)
@@ -303,13 +303,13 @@ class Swarm:
                     other.send(Gone(uav))
 
     def log_tail(self, name: str) -> str:
-        """The end of a process's log."""
+        """Return the last lines of a process's log."""
         path = self.folder / "logs" / f"{name}.log"
         lines = path.read_text(errors="replace").strip().splitlines() if path.exists() else []
         return "\n".join(lines[-_TAIL_LINES:])
 
     def release(self) -> None:
-        """Everybody has ended: let them close and wait until they are gone."""
+        """Release the processes, which have all ended their flight, and wait until they exit."""
         self._selector.close()
         for child in self.children:
             child.send(Release())

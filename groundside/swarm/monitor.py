@@ -1,4 +1,4 @@
-"""The ground station's ear: hears all vehicles of a swarm on one port, keeps a log, and knows the swarm's state."""
+"""Receive the telemetry of all UAVs of a swarm on one port, log it, and provide snapshots of the swarm."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from ftcc.sim.process import truth_array
 __all__ = ["Monitor"]
 
 _STAMP = struct.Struct(">Q")
-"""What a .tlog has before each message: its Unix time, us."""
+"""Time stamp before each message in a .tlog: Unix time, us."""
 _LINK_BITS = 0b11
-"""The bits of a stamp in which MAVProxy keeps the number of a link."""
+"""Bits of a stamp in which MAVProxy stores the number of a link."""
 _MAX_STAMP_US = 10**11
-"""No flight lasts longer: a later stamp is none."""
+"""Stamps beyond this, longer than any flight, are ignored."""
 
 
 @dataclass(slots=True)
 class _UavTelemetry:
-    """Latest telemetry of one UAV, as numbers: names are given to them when a snapshot is wanted."""
+    """Latest telemetry of one UAV as plain numbers; `Monitor.snapshot` assigns the names."""
 
     t: float = 0.0
     truth: tuple[float, ...] = ()
@@ -45,9 +45,9 @@ class _UavTelemetry:
 class Monitor:
     """Receives the telemetry of UAVs of a ``plant`` on ``port``; writes it to ``log`` as a .tlog if given.
 
-    It believes what comes from the ports in ``sources`` alone. Systems are UAVs' ids and ``id_offset``. The log has as
-    times ``started`` (Unix time, s) and the newest simulated time told: replayed, it lasts as long as the flight, as
-    fast as that was flown and however long it was held, and no step of the clock reaches it.
+    Only datagrams from the ports in ``sources`` are accepted. The MAVLink system id of a UAV is its id plus
+    ``id_offset``. Time stamps in the log are ``started`` (Unix time, s) plus the newest simulated time received, so
+    that its replay takes the simulated duration of the flight, independent of pace, pauses and changes of the clock.
     """
 
     def __init__(
@@ -72,14 +72,14 @@ class Monitor:
         self._log_error = ""
         self._events: list[Event] = []
         self.t = 0.0
-        """Newest simulated time heard, s."""
+        """Newest simulated time received, s."""
 
     def fileno(self) -> int:
-        """For ``select``."""
+        """Return the descriptor for ``select``."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Free the port, finish the log."""
+        """Close the socket and the log."""
         self._socket.close()
         if self._log:
             try:
@@ -89,7 +89,7 @@ class Monitor:
             self._log = None
 
     def read(self) -> None:
-        """Take in all telemetry that has arrived."""
+        """Read all telemetry that has arrived."""
         for messages in self._socket.receive():
             if self._log and messages:
                 newest = max(message.stamp_us for message in messages)
@@ -103,7 +103,7 @@ class Monitor:
                     self._store(uav, message)
 
     def _write(self, frames: bytes) -> None:
-        """Append to the log; one that cannot be written ends."""
+        """Append to the log; stop logging if that fails."""
         assert self._log is not None
         try:
             self._log.write(frames)
@@ -112,10 +112,10 @@ class Monitor:
 
     def _end_log(self, error: OSError) -> None:
         self._log = None
-        self._log_error = f"the telemetry is not logged any further: {error.strerror or error}"
+        self._log_error = f"telemetry logging stopped: {error.strerror or error}"
 
     def take_log_error(self) -> str:
-        """Why the log has ended before its time, once; else empty."""
+        """Return why logging stopped, once; else an empty text."""
         error, self._log_error = self._log_error, ""
         return error
 
@@ -136,12 +136,12 @@ class Monitor:
 
     @property
     def foreign_datagrams(self) -> int:
-        """Datagrams that came from elsewhere."""
+        """Return the number of datagrams dropped because they came from other ports."""
         return self._socket.foreign_datagrams
 
     @property
     def complete(self) -> bool:
-        """Whether every UAV has been heard."""
+        """Return whether telemetry of every UAV has been received."""
         return all(uav.truth for uav in self._uavs.values())
 
     def add_event(self, event: Event) -> None:
@@ -150,11 +150,11 @@ class Monitor:
 
     @property
     def late(self) -> int:
-        """Ticks in which commands came too late, of all UAVs together, as far as was heard."""
+        """Return the number of ticks with late commands, summed over all UAVs that have reported."""
         return sum(int(uav.truth[self._late]) for uav in self._uavs.values() if uav.truth)
 
     def snapshot(self) -> Snapshot:
-        """The swarm as heard so far, and what happened since the last call."""
+        """Return the latest state of the swarm, and the events since the last call."""
         uavs = {uav: self._read_state(latest) for uav, latest in self._uavs.items() if latest.truth}
         events, self._events = tuple(self._events), []
         return Snapshot(self.t, uavs, events)
@@ -163,7 +163,10 @@ class Monitor:
 def _state_reader(
     plant: ModuleType, truth_names: Sequence[str], signals: Sequence[str]
 ) -> Callable[[_UavTelemetry], UavState]:
-    """What makes a `UavState` of what was heard: by the names of the plant's array "truth" and of the signals."""
+    """Return a function that converts telemetry to a `UavState`.
+
+    ``truth_names`` are the columns of the plant's array "truth", ``signals`` those of the scheme's array.
+    """
     column = {name: i for i, name in enumerate(truth_names)}
     columns = {
         "truth": {name: column[name] for name in TRUTH},
@@ -192,7 +195,7 @@ def _state_reader(
 
 
 def _picker(places: list[int]) -> Callable[[Sequence[float]], tuple[float, ...]]:
-    """What takes the numbers at ``places``, as a tuple however many they are."""
+    """Return a function that picks the numbers at ``places`` as a tuple."""
     if len(places) > 1:
         return operator.itemgetter(*places)
     return lambda values: tuple(values[place] for place in places)

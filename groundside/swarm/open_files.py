@@ -1,6 +1,6 @@
-"""How many files a flight with processes has open, and room for them before it starts.
+"""Count the files that a flight with processes opens, and raise the system's limit before it starts.
 
-Counted on Linux: what each process has whatever it flies, rounded up, and what comes with each UAV.
+The numbers were counted on Linux: a constant per process, rounded up, and a number per UAV.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 __all__ = ["TooFewFilesError", "files_needed", "provide_files"]
 
 _LAUNCHER, _PER_PROCESS = 40, 3
-"""Station, log, viewer, sockets that tell; and a pipe, a sentinel and the fork server's word of each process."""
+"""Station, log, viewer, control and feed sockets; per process a pipe, a sentinel and a pipe of the fork server."""
 _VEHICLE, _PER_VEHICLE = 16, 3
-"""Pipes, log, libraries; and the ends towards autopilot and station, and a part of the recording."""
+"""Pipes, log, libraries; per UAV the sockets to autopilot and station, and a part of the recording."""
 _AUTOPILOT, _PER_AUTOPILOT = 26, 5
-"""Beside those also the mesh; and the ends towards vehicle, station and callers, and two parts of the recording."""
+"""As a vehicle process, and the mesh; per UAV the sockets to vehicle, station and clients, and two parts."""
 
 
 class TooFewFilesError(UserError):
@@ -28,7 +28,7 @@ class TooFewFilesError(UserError):
 
 
 def files_needed(mission: Mission, pack: int, listeners: int) -> int:
-    """Open files of the process of a flight that has most.
+    """Return the largest number of files that one process of a flight opens.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def files_needed(mission: Mission, pack: int, listeners: int) -> int:
     pack : int
         Vehicles per process.
     listeners : int
-        Ground stations that are told.
+        Number of ground stations that receive telemetry.
     """
     uavs = [spec.uav for spec in mission.vehicles]
     group = {uav: n // pack for n, uav in enumerate(uavs)}
@@ -48,7 +48,7 @@ def files_needed(mission: Mission, pack: int, listeners: int) -> int:
 
 
 def provide_files(mission: Mission, pack: int, listeners: int) -> None:
-    """Let this process, and those that it starts, open as many files as a flight needs; arguments as `files_needed`.
+    """Allow this process and its children as many open files as a flight needs; arguments as `files_needed`.
 
     Raises
     ------

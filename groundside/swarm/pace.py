@@ -1,9 +1,9 @@
-"""How fast a swarm flies on the wall clock, what limits it, and what would help.
+"""Measure how fast a swarm flies on the wall clock, what limits it, and what would help.
 
-`PaceMeter` reads, about once a second, how much processor time each process of the swarm and the whole machine have
-used; `judge` compares two such samples. What it tells apart: the machine is full, with the swarm's own processes or
-with other programs; one process, or a vehicle and an autopilot process in turn, fill one core while others idle; nobody
-is busy, and time goes by between a message and the wake-up of who waits for it.
+`PaceMeter` reads, about once per second, the processor time used by each process of the swarm and by the whole machine;
+`judge` compares two such samples. It distinguishes three limits: all cores are busy, with the swarm's own processes or
+with other programs; one process, or a vehicle and an autopilot process in turn, fills one core while others idle; no
+core is busy, and time passes between a message and the wake-up of its receiver.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from ftcc.groundside.dashboard import Pace
 __all__ = ["Kind", "Member", "PaceMeter", "Sample", "Setup", "judge", "loads", "processes_of", "usable_cores"]
 
 Kind = Literal["vehicle", "autopilot", "ground station", "viewer"]
-"""What a process of a swarm is."""
+"""Kind of a process of a swarm."""
 
 _WINDOW = 5.0
 """Wall time over which a factor is measured, s."""
 _SHORTEST = 0.5
-"""Below it there is no factor yet, s."""
+"""Shortest wall time over which a factor is measured, s."""
 _HELD = 0.97
-"""Share of the factor asked for from which on it counts as held."""
+"""Share of the requested factor from which it counts as reached."""
 _OLD = 0.1
-"""By how much older the simulated time of one sample may be than that of another: it comes with telemetry, wall s."""
+"""Largest delay of a sample's simulated time, which comes with telemetry, wall s."""
 _FULL = 0.9
-"""Share of all cores from which on the machine is full."""
+"""Share of all cores from which the machine counts as full."""
 _FOREIGN = 0.2
-"""Share of all cores from which on other programs are to blame for that."""
+"""Share of all cores from which other programs are named as the cause."""
 _SATURATED = 0.85
-"""Share of one core from which on a process has no time left."""
+"""Share of one core from which a process counts as saturated."""
 _IN_TURN = 1.1
-"""Cores that a vehicle and an autopilot process use together at most, if only one of them works at a time."""
+"""Largest load, in cores, of a vehicle and an autopilot process that work in turn."""
 _ROOM = 0.9
-"""Idle cores from which on more processes would find one."""
+"""Number of idle cores from which more processes would help."""
 _NOTICEABLE = 0.05
-"""Share of all cores from which on leaving something out helps."""
+"""Share of all cores from which leaving something out helps."""
 
 _CGROUP_LIMIT = Path("/sys/fs/cgroup/cpu.max")
 _PLURAL: dict[Kind, str] = {"vehicle": "vehicles", "autopilot": "autopilots"}
@@ -58,41 +58,41 @@ class Member(NamedTuple):
 
     @property
     def group(self) -> str:
-        """What a vehicle process and its autopilot process have in common: the UAVs, as ``uav1-8``."""
+        """Return the UAVs of a process, such as ``uav1-8``; a vehicle process and its autopilot process share them."""
         return self.name.removesuffix(f"-{self.kind}")
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Who has used how much processor time until one instant."""
+    """Processor time used up to one instant."""
 
     wall: float
-    """Monotonic, s."""
+    """Monotonic wall time, s."""
     t: float
-    """Simulated, s."""
+    """Simulated time, s."""
     used: Mapping[Member, float]
-    """By each process since it began, s."""
+    """Processor time of each process since its start, s."""
     busy: float
-    """By everybody on all usable cores since the machine started, s."""
+    """Busy time of all usable cores since the machine started, s."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """How the swarm is flown, as far as it could be flown otherwise."""
+    """How the swarm is flown: speed, processes, cores."""
 
     asked: float | None
-    """Times real time; None = as fast as possible."""
+    """Requested speed, times real time; None: as fast as possible."""
     uavs: int
     pack: int
     """Vehicles per process."""
     automatic: int
-    """What ``--pack auto`` would be."""
+    """Vehicles per process with ``--pack auto``."""
     cores: int
-    """That the swarm may use."""
+    """Number of cores that the swarm may use."""
 
 
 def usable_cores() -> int:
-    """Cores that this process may use: those that it is bound to, or fewer in a container with a limit."""
+    """Return the number of cores that this process may use, by its CPU affinity and the limit of its container."""
     bound = len(_allowed_cores())
     if not _CGROUP_LIMIT.exists():
         return bound
@@ -107,9 +107,9 @@ def _allowed_cores() -> Collection[int]:
 
 
 def processes_of(folder: Path, launcher: int) -> list[tuple[str, int, Kind]]:
-    """Name, pid and kind of the vehicle and autopilot processes of the run in ``folder``, by the logs they write.
+    """Return name, pid and kind of the vehicle and autopilot processes of the run in ``folder``.
 
-    For whoever has not started them, but knows the pid of their ``launcher``.
+    They are the children of the process ``launcher`` (pid) that write logs there.
     """
     logs = {str(path): path.stem for path in (folder.resolve() / "logs").glob("*.log")}
     found: list[tuple[str, int, Kind]] = []
@@ -124,32 +124,32 @@ def processes_of(folder: Path, launcher: int) -> list[tuple[str, int, Kind]]:
 
 
 def loads(earlier: Sample, later: Sample) -> dict[Member, float]:
-    """Cores that each process kept busy between two samples, of those that are in both."""
+    """Return the mean load, in cores, of each process that is in both samples."""
     wall = later.wall - earlier.wall
     return {one: (used - earlier.used[one]) / wall for one, used in later.used.items() if one in earlier.used}
 
 
 def judge(earlier: Sample, later: Sample, setup: Setup) -> Pace:
-    """The pace between two samples, and what limited it."""
+    """Return the pace between two samples, and what limited it."""
     wall = later.wall - earlier.wall
     factor = (later.t - earlier.t) / wall
     if setup.asked is not None and factor * wall >= _HELD * setup.asked * (wall - _OLD):
         return Pace(factor, setup.asked)
-    of = loads(earlier, later)
-    by_kind = {kind: sum(load for one, load in of.items() if one.kind == kind) for kind in get_args(Kind)}
-    everybody = (later.busy - earlier.busy) / wall
-    foreign = max(0.0, everybody - sum(by_kind.values()))
-    if everybody >= _FULL * setup.cores:
+    load_of = loads(earlier, later)
+    by_kind = {kind: sum(load for member, load in load_of.items() if member.kind == kind) for kind in get_args(Kind)}
+    total = (later.busy - earlier.busy) / wall
+    foreign = max(0.0, total - sum(by_kind.values()))
+    if total >= _FULL * setup.cores:
         limit, advice = _limit_of_full_machine(by_kind, foreign, setup)
     else:
-        limit, advice = _limit_of_one_core(of, everybody, setup) or _limit_of_waiting(by_kind, everybody, setup)
+        limit, advice = _limit_of_one_core(load_of, total, setup) or _limit_of_waiting(by_kind, total, setup)
     if setup.asked is not None:
         advice = [*advice, f"--speed {_rounded(0.9 * factor)}"]
     return Pace(factor, setup.asked, limit, " or ".join(advice))
 
 
 def _limit_of_full_machine(by_kind: Mapping[Kind, float], foreign: float, setup: Setup) -> tuple[str, list[str]]:
-    """All cores are busy."""
+    """Return limit and advice if all cores are busy."""
     full = f"all {setup.cores} cores are busy" if setup.cores > 1 else "the only core is busy"
     if foreign >= _FOREIGN * setup.cores:
         advice = ["fewer other programs (a browser that shows the dashboard is one of them)"]
@@ -161,7 +161,7 @@ def _limit_of_full_machine(by_kind: Mapping[Kind, float], foreign: float, setup:
 
 
 def _advice_to_save(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
-    """What makes the same flight cheaper."""
+    """Return options that make the same flight cheaper."""
     advice = []
     if setup.pack < setup.automatic:
         advice.append("--pack auto")
@@ -170,17 +170,17 @@ def _advice_to_save(by_kind: Mapping[Kind, float], setup: Setup) -> list[str]:
     return advice
 
 
-def _limit_of_one_core(of: Mapping[Member, float], everybody: float, setup: Setup) -> tuple[str, list[str]] | None:
-    """One process, or the two of one group in turn, fill a core while others idle; None if nobody does."""
-    flying = {one: load for one, load in of.items() if one.kind in ("vehicle", "autopilot")}
+def _limit_of_one_core(load_of: Mapping[Member, float], total: float, setup: Setup) -> tuple[str, list[str]] | None:
+    """Return limit and advice if one process, or the two of one group in turn, fill a core; else None."""
+    flying = {member: load for member, load in load_of.items() if member.kind in ("vehicle", "autopilot")}
     if not flying:
         return None
-    idle = setup.cores - everybody
+    idle = setup.cores - total
     idling = f"while {idle:.1f} of {setup.cores} cores idle"
-    busiest = max(flying, key=lambda one: flying[one])
+    busiest = max(flying, key=lambda member: flying[member])
     groups: dict[str, float] = {}
-    for one, load in flying.items():
-        groups[one.group] = groups.get(one.group, 0.0) + load
+    for member, load in flying.items():
+        groups[member.group] = groups.get(member.group, 0.0) + load
     fullest = max(groups, key=lambda group: groups[group])
     if flying[busiest] >= _SATURATED:
         limit = f"{busiest.name} alone fills a core ({flying[busiest]:.0%}) {idling}"
@@ -195,15 +195,15 @@ def _limit_of_one_core(of: Mapping[Member, float], everybody: float, setup: Setu
     return limit, [f"--pack {setup.pack // 2}: smaller packs use more cores"]
 
 
-def _limit_of_waiting(by_kind: Mapping[Kind, float], everybody: float, setup: Setup) -> tuple[str, list[str]]:
-    """Cores idle and nobody is short of one."""
+def _limit_of_waiting(by_kind: Mapping[Kind, float], total: float, setup: Setup) -> tuple[str, list[str]]:
+    """Return limit and advice if no core is full."""
     own = sum(by_kind.values())
     limit = f"processes wait for each other's messages: the swarm uses {own:.1f} of {setup.cores} cores"
     return limit, ["--pack auto: fewer processes wait for each other"] if setup.pack < setup.automatic else []
 
 
 def _rounded(factor: float) -> str:
-    """Two significant digits, downwards."""
+    """Round down to two significant digits."""
     if factor <= 0.0:
         return "lower"
     unit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -211,11 +211,11 @@ def _rounded(factor: float) -> str:
 
 
 class PaceMeter:
-    """Measures the pace of a flying swarm; to be asked about once a second.
+    """Measures the pace of a flying swarm, about once per second.
 
     Parameters
     ----------
-    setup : how the swarm is flown; to be replaced when another speed is asked for, with `restart`.
+    setup : how the swarm is flown; when the speed changes, replace it and call `restart`.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -225,21 +225,21 @@ class PaceMeter:
         self._cores = frozenset(_allowed_cores())
 
     def restart(self) -> None:
-        """Forget what was measured: after a pause, a step, or a change of speed."""
+        """Discard all samples, after a pause, a step, or a change of speed."""
         self._samples.clear()
 
     def measure(
         self, wall: float, t: float, processes: Iterable[tuple[str, int, Kind]], viewers: Iterable[int], own: int
     ) -> Pace:
-        """The pace over the last 5 s of wall time; its factor is nan until half a second has been seen.
+        """Return the pace over the last 5 s of wall time; its factor is nan during the first half second.
 
-        Slower than real time it takes two simulated seconds: the telemetry tells of time in steps of 0.1 s.
+        Below real time it is taken over two simulated seconds, because telemetry reports time in steps of 0.1 s.
 
         Parameters
         ----------
-        wall, t : the present instant, monotonic and simulated, s.
+        wall, t : current monotonic and simulated time, s.
         processes : name, pid and kind of each living process of vehicles and autopilots.
-        viewers : pids of the dashboard's viewer, if this flight has started one.
+        viewers : pids of the dashboard's viewer, if this flight started one.
         own : pid of the ground station.
         """
         asked = self.setup.asked
@@ -255,18 +255,18 @@ class PaceMeter:
     def sample(
         self, wall: float, t: float, processes: Iterable[tuple[str, int, Kind]], viewers: Iterable[int], own: int
     ) -> Sample:
-        """What everybody has used until now; arguments as for `measure`."""
-        everybody: list[tuple[str, int, Kind]] = [*processes, ("ground station", own, "ground station")]
-        everybody += [(f"viewer {pid}", pid, "viewer") for pid in viewers]
+        """Return the processor time used so far; arguments as for `measure`."""
+        members: list[tuple[str, int, Kind]] = [*processes, ("ground station", own, "ground station")]
+        members += [(f"viewer {pid}", pid, "viewer") for pid in viewers]
         used = {}
-        for name, pid, kind in everybody:
+        for name, pid, kind in members:
             seconds = self._used(pid)
             if seconds is not None:
                 used[Member(name, kind)] = seconds
         return Sample(wall, t, used, self._busy())
 
     def _used(self, pid: int) -> float | None:
-        """Processor time of a process, s; None if it is gone."""
+        """Return the processor time of a process, s; None if it has ended."""
         try:
             if pid not in self._processes:
                 self._processes[pid] = psutil.Process(pid)
@@ -276,11 +276,11 @@ class PaceMeter:
         return float(times.user + times.system)
 
     def _busy(self) -> float:
-        """Processor time of the whole machine on the cores that the swarm may use, s."""
+        """Return the busy time of all cores that the swarm may use, s."""
         total = 0.0
         for core, times in enumerate(psutil.cpu_times(percpu=True)):
             if core in self._cores:
-                # Linux counts guests as users too; waiting for a disk is idling.
+                # Linux counts guest time also as user time; waiting for a disk is idle time.
                 idle = times.idle + getattr(times, "iowait", 0.0)
                 guests = getattr(times, "guest", 0.0) + getattr(times, "guest_nice", 0.0)
                 total += sum(times) - idle - guests

@@ -1,4 +1,4 @@
-"""Watches over the pace of a flight: measures it once a second and says, once, where it falls short and why."""
+"""Monitor the pace of a flight: measure it once per second, and warn once if it is too slow, with the cause."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = ["LATE_SHARE", "Pacing"]
 _PERIOD = 1.0
 """Wall time between two measurements, s."""
 _MISSES_BEFORE_WARNING = 5
-"""Measurements in a row that fall short before that is said: a start, or a moment, is no reason."""
+"""Consecutive slow measurements before a warning, so that the start or a short delay causes none."""
 LATE_SHARE = 0.05
-"""Share of late ticks from which on the wall clock is overloaded."""
+"""Share of late ticks from which a flight on the wall clock counts as overloaded."""
 _LATE_WINDOW = 2.0
-"""Wall time for which it must have been, s."""
+"""Wall time over which the share of late ticks is measured, s."""
 
 
 class Pacing:
@@ -29,29 +29,29 @@ class Pacing:
     Parameters
     ----------
     setup : how the swarm is flown.
-    lockstep : whether a slow computer slows the flight down; otherwise ticks are late.
+    lockstep : whether a slow computer slows the flight; otherwise ticks are late.
     """
 
     def __init__(self, setup: Setup, lockstep: bool) -> None:
         self.pace = Pace(math.nan, setup.asked)
-        """As it was measured last; its factor is nan until half a second was seen."""
+        """Latest measurement; its factor is nan during the first half second."""
         self._meter = PaceMeter(setup)
         self._lockstep = lockstep
         self._measured = -math.inf
         self._misses = 0
-        """Measurements in a row that fell short."""
+        """Consecutive slow measurements."""
         self._ticks: collections.deque[tuple[float, int, int, Sample]] = collections.deque()
-        """Wall time, late ticks, all ticks and who used how much, of the last seconds."""
+        """Wall time, late ticks, all ticks and processor times, of the last seconds."""
         self._overloaded = False
 
     def set_speed(self, speed: float) -> None:
-        """Another speed is asked for; inf: as fast as possible."""
+        """Set the requested speed, times real time; inf: as fast as possible."""
         asked = None if math.isinf(speed) else speed
         self._meter.setup = dataclasses.replace(self._meter.setup, asked=asked)
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew: after a start, a pause, a step or a change of speed."""
+        """Restart the measurement, after a start, a pause, a step or a change of speed."""
         self._meter.restart()
         self._ticks.clear()
         self._misses = 0
@@ -65,13 +65,13 @@ class Pacing:
         processes: Iterable[tuple[str, int, Kind]],
         viewers: Iterable[int],
     ) -> str:
-        """Measure, if a second has passed; what is to be said, else empty.
+        """Measure the pace if a second has passed; return a warning, or an empty text.
 
         Parameters
         ----------
-        wall, t : the present instant, monotonic and simulated, s.
+        wall, t : current monotonic and simulated time, s.
         ticks : late ticks of all vehicles so far, and all ticks.
-        processes : name, pid and kind of those that fly.
+        processes : name, pid and kind of each process that flies.
         viewers : pids of the dashboard's viewer.
         """
         if wall - self._measured < _PERIOD:
@@ -85,7 +85,7 @@ class Pacing:
         return self._check_wall_clock(wall, *ticks, sample)
 
     def _check_lockstep(self) -> str:
-        """Lockstep: the speed asked for is not reached."""
+        """Return a warning if a flight in lockstep misses the requested speed."""
         self._misses = self._misses + 1 if self.pace.asked is not None and self.pace.limit else 0
         if self._misses != _MISSES_BEFORE_WARNING:
             return ""
@@ -93,7 +93,7 @@ class Pacing:
         return f"{text}; {self.pace.advice} would help" if self.pace.advice else text
 
     def _check_wall_clock(self, wall: float, late: int, ticks: int, sample: Sample) -> str:
-        """The wall clock: too many ticks are late."""
+        """Return a warning if too many ticks of a flight on the wall clock are late."""
         self._ticks.append((wall, late, ticks, sample))
         while len(self._ticks) > 1 and self._ticks[1][0] <= wall - _LATE_WINDOW:
             self._ticks.popleft()
@@ -104,7 +104,7 @@ class Pacing:
         before, self._overloaded = self._overloaded, share > LATE_SHARE
         if before or not self._overloaded:
             return ""
-        # As fast as possible: whatever limits it makes the ticks late.
+        # Judge as if flying as fast as possible: that limit makes the ticks late.
         cause = judge(earlier, sample, dataclasses.replace(self._meter.setup, asked=None))
         text = f"{share:.0%} of the ticks were late in the last {wall - begun:.0f} s: {cause.limit}"
         advice = " or ".join(filter(None, (cause.advice, "--clock lockstep, which loses none")))

@@ -1,9 +1,9 @@
-"""Imported once by the fork server: what every process of a swarm needs, compiled or loaded, before it is forked.
+"""Load and compile what every process of a swarm needs; the fork server imports this once, before it forks.
 
-No socket, no thread, no Zenoh or Rerun here. Arrow is, with a first batch written: each child would pay 15 MB for it.
+No sockets, threads, Zenoh or Rerun here. Arrow is loaded, and a first batch written: in each child it would cost 15 MB.
 """
 
-# ruff: noqa: E402 (the collector rests before anything is imported)
+# ruff: noqa: E402 (the garbage collector is off before anything is imported)
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import gc
 import os
 from pathlib import Path
 
-# What is loaded here stays: a garbage collection finds nothing in it, and in a child it would touch, and so copy, all
-# pages that are shared. A quarter of the time that loading takes is saved, too.
+# Everything loaded here stays in use. A garbage collection in a child would write to, and so copy, all shared memory
+# pages. Without it, loading is also a quarter faster.
 gc.disable()
 
 # Arrow's allocator would start a thread, which no child would have.
@@ -42,12 +42,12 @@ PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
 
 
 def load(scheme: str, plant: str) -> None:
-    """Load, or compile, everything that a swarm of ``scheme`` on ``plant`` runs."""
+    """Load or compile everything that a swarm of ``scheme`` on ``plant`` executes."""
     timing = Timing(1, 1, 1, 1, 1, 1, 1)
     rows, link_rows = (new_rows(1, len(columns)) for columns in (autopilot_process.columns(scheme), LINK_COLUMNS))
     autopilots = build_autopilots([no_autopilot(scheme)], timing, rows, link_rows)
     autopilot_process.load_compiled(autopilots, timing, flight_of_autopilots(scheme))
-    # Called from Python where transmissions go out and come in: loaded by each child, they would cost it 5 MB.
+    # Python calls these when it sends and receives; loaded in each child, they would cost 5 MB.
     begin(autopilots.transmission, 0, 0, 0, 1)
     take_in(autopilots.transmission, autopilots.exchange)
     vehicles = build_vehicles([no_vehicle(plant)], new_rows(1, len(vehicle_process.columns(plant))), 1)

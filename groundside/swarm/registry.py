@@ -1,4 +1,4 @@
-"""The list of running swarms of this user, and the socket by which each can be told what to do."""
+"""List the running swarms of this user, and send them commands through a socket."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ __all__ = ["ControlSocket", "Entry", "VehicleEntry", "ask_swarm", "check_name", 
 
 
 _MAX_SOCKET_PATH = 107
-"""Of a socket, bytes."""
+"""Longest path of a Unix socket, bytes."""
 
 
 @dataclass(frozen=True)
 class VehicleEntry:
-    """A UAV of a running swarm."""
+    """One UAV of a running swarm."""
 
     uav: int
     system: int
-    """Its MAVLink system id."""
+    """MAVLink system id."""
     role: str
     """"follower" or "leader"."""
     port: int
@@ -58,7 +58,7 @@ class Entry:
     folder: str
     vehicles: tuple[VehicleEntry, ...]
     key: str | None
-    """Key file, where its links to the ground are signed."""
+    """Key file; None if MAVLink messages to the ground are not signed."""
     ports: tuple[int, int]
     """First and last port of its block."""
     viewer: str | None
@@ -75,7 +75,7 @@ def _socket_path(name: str) -> Path:
 
 
 def check_name(name: str) -> None:
-    """Refuse a swarm's name that is taken, or too long for its sockets; it may get some more characters yet.
+    """Refuse a swarm name that is in use, or too long for the paths of its sockets.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def _is_alive(pid: int) -> bool:
 
 
 def running_swarms() -> list[Entry]:
-    """All swarms whose launcher is alive; cards of dead launchers are removed."""
+    """Return all swarms whose launcher is alive, and remove the entries of dead launchers."""
     found = []
     for path in sorted(runtime_folder().glob("*.json")):
         try:
@@ -109,7 +109,7 @@ def running_swarms() -> list[Entry]:
             vehicles = tuple(VehicleEntry.from_json(vehicle) for vehicle in data["vehicles"])
             entry = Entry(**{**data, "vehicles": vehicles, "ports": tuple(data["ports"])})
         except (ValueError, TypeError, KeyError, FileNotFoundError):
-            continue  # being written or removed at this very moment, or not ours
+            continue  # another process is writing or removing it, or it is no registry file
         if _is_alive(entry.pid):
             found.append(entry)
         else:
@@ -119,12 +119,12 @@ def running_swarms() -> list[Entry]:
 
 
 def find_swarm(name: str | None) -> Entry:
-    """The running swarm called ``name``, or the only one.
+    """Return the running swarm called ``name``; without a name, the only running swarm.
 
     Raises
     ------
     LookupError
-        If there is no such swarm, or ``name`` was needed to choose.
+        If there is no such swarm, or several run and ``name`` is None.
     """
     entries = running_swarms()
     names = ", ".join(entry.name for entry in entries) or "none"
@@ -141,7 +141,7 @@ def find_swarm(name: str | None) -> Entry:
 
 
 def ask_swarm(entry: Entry, command: str, **arguments: Any) -> Any:
-    """Tell a swarm what to do and return its answer.
+    """Send a command to a swarm and return its answer.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def ask_swarm(entry: Entry, command: str, **arguments: Any) -> Any:
 
 
 class ControlSocket:
-    """The launcher's end: a card in the list and a socket that takes commands, a JSON object a line."""
+    """Register a swarm and answer commands from its socket, one JSON object per line."""
 
     def __init__(self, entry: Entry, handle: Callable[[str, dict[str, Any]], Any]) -> None:
         self._entry = entry
@@ -178,11 +178,11 @@ class ControlSocket:
         path.with_suffix(".new").rename(path)
 
     def fileno(self) -> int:
-        """For ``select``."""
+        """Return the descriptor for ``select``."""
         return self._server.fileno()
 
     def serve(self) -> None:
-        """Answer one caller; a caller that sends nonsense, or nothing for half a second, is turned away."""
+        """Answer one client; refuse one that sends an invalid request, or nothing for half a second."""
         with contextlib.suppress(BlockingIOError):
             link, _ = self._server.accept()
             with link:
@@ -191,13 +191,13 @@ class ControlSocket:
                     request = json.loads(link.makefile().readline())
                     command = request.pop("command")
                     answer = {"ok": True, "value": self._handle(command, request)}
-                except Exception as error:  # whatever is wrong with a request, the swarm flies on
+                except Exception as error:  # a bad request must not end the flight
                     answer = {"ok": False, "error": str(error) or repr(error)}
                 with contextlib.suppress(OSError):
                     link.sendall(json.dumps(answer).encode() + b"\n")
 
     def close(self) -> None:
-        """Leave the list."""
+        """Remove the swarm from the registry."""
         self._server.close()
         _entry_path(self._entry.name).unlink(missing_ok=True)
         self._path.unlink(missing_ok=True)

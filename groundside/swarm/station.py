@@ -1,10 +1,9 @@
-"""A ground station for a running swarm: commands, faults, link failures and parameters, each acknowledged.
+"""Command a running swarm: flight commands, faults, link events and parameters, each acknowledged.
 
     with Station() as station:
         station.fault(3, "elevator", effectiveness=0.6, bias=0.2)
 
-It speaks MAVLink with the autopilots, as anybody's ground station does, and knows from the list of running swarms where
-they are.
+It speaks MAVLink with the autopilots, like any ground station, and finds their ports in the registry of running swarms.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ ACTUATORS = {
     "bank": ("servo", 1),
     "load_factor": ("servo", 2),
 }
-"""Unit and instance of what can fail on board by our names; the last two are what a point mass is steered by."""
+"""MAVLink unit and instance of each actuator; the last two are the inputs of a point mass."""
 
 _NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
 
@@ -38,7 +37,7 @@ _PARTS = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
 
 @dataclass
 class VehicleState:
-    """What a UAV tells of itself."""
+    """State that a UAV reports."""
 
     uav: int
     role: str
@@ -50,11 +49,11 @@ class VehicleState:
     airspeed: float
     """m/s."""
     fault_tolerance: bool | None = None
-    """None where the scheme has none to switch."""
+    """None if the scheme has no fault tolerance to switch."""
 
 
 class Station(Conversation):
-    """A ground station for a running swarm, see `Conversation` for how it is made."""
+    """A ground station for a running swarm; see `Conversation` for its parameters."""
 
     def __enter__(self) -> Self:
         return self
@@ -63,7 +62,7 @@ class Station(Conversation):
         self.close()
 
     def vehicles(self) -> list[VehicleState | NoAnswerError]:
-        """What each UAV tells of itself, or that it does not answer."""
+        """Return the state that each UAV reports, or the error if it does not answer."""
         found: list[VehicleState | NoAnswerError] = []
         for uav in self.uavs:
             try:
@@ -73,7 +72,7 @@ class Station(Conversation):
         return found
 
     def state(self, uav: int) -> VehicleState:
-        """What one UAV tells of itself."""
+        """Return the state that one UAV reports."""
         beat = self.request(uav, dialect.MAVLINK_MSG_ID_HEARTBEAT)
         place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
         card = self.card(uav)
@@ -96,20 +95,20 @@ class Station(Conversation):
         at: float | None = None,
         **sizes: float,
     ) -> float:
-        """Make something on board fail.
+        """Inject a fault of an actuator or of the navigation solution.
 
         Parameters
         ----------
         what : "aileron", "elevator", "rudder", "thrust", or of a point mass "bank", "load_factor"; or "position",
             "attitude" of the navigation solution.
         kind : "wrong", "off", "stuck", "slow", "intermittent" or "ok".
-        at : simulated time, s; None: at once.
+        at : simulated time, s; None: now.
         sizes : such as ``effectiveness=0.6, bias=0.2``, see ``ftcc.link.failures.SIZES``.
 
         Returns
         -------
         float
-            The simulated time at which it acts, s.
+            Simulated time at which the fault takes effect, s.
 
         Raises
         ------
@@ -121,7 +120,7 @@ class Station(Conversation):
         return self.inject(uav, unit, kind, instance, at=at, **sizes)
 
     def repair(self, uav: int, what: str | None = None, *, at: float | None = None) -> None:
-        """Repair something on board, or everything."""
+        """Remove the fault of one actuator or of the navigation solution, or all faults."""
         if what is not None:
             self.fault(uav, what, kind="ok", at=at)
             return
@@ -131,7 +130,7 @@ class Station(Conversation):
     def inject(
         self, uav: int, unit: str, kind: str, instance: int = 0, *, at: float | None = None, **sizes: float
     ) -> float:
-        """MAV_CMD_INJECT_FAILURE by our names of unit and kind, see `ftcc.link.failures`; the time at which it acts."""
+        """Send MAV_CMD_INJECT_FAILURE, unit and kind named as in `ftcc.link.failures`; return when it acts, s."""
         if unit not in UNITS or kind not in KINDS:
             raise StationError(f"{unit} {kind}: units are {', '.join(UNITS)}; kinds are {', '.join(KINDS)}")
         scheduled = _ScheduledAt(self, uav, at)
@@ -150,21 +149,24 @@ class Station(Conversation):
     # Links.
 
     def cut(self, a: int, b: int | None = None, *, at: float | None = None) -> list[str]:
-        """Cut the links between two UAVs, or the radio of one; what went wrong at one of two ends, empty if nothing."""
+        """Cut the links between two UAVs, or switch off the radio of one.
+
+        Returns the errors of UAVs that did not accept the command while others did; empty if all accepted.
+        """
         if b is None:
             self.inject(a, "radio", "off", at=at)
             return []
         return self._both_ends(a, b, lambda uav, sender: self.inject(uav, "radio", "off", sender, at=at))
 
     def restore(self, a: int, b: int | None = None, *, at: float | None = None) -> list[str]:
-        """Restore the links between two UAVs, or all of one and its radio; what went wrong, as `cut`."""
+        """Restore the links between two UAVs, or all links and the radio of one; returns errors as `cut`."""
         if b is not None:
             return self._both_ends(a, b, lambda uav, sender: self.inject(uav, "radio", "ok", sender, at=at))
         self.inject(a, "radio", "ok", at=at)
         return self._at_receivers(a, lambda uav: self.inject(uav, "radio", "ok", a, at=at))
 
     def degrade(self, a: int, b: int | None = None, *, at: float | None = None, **sizes: float) -> list[str]:
-        """Degrade the links between two UAVs, or all of one; what went wrong, as `cut`.
+        """Degrade the links between two UAVs, or all links of one; returns errors as `cut`.
 
         ``sizes``: loss, burst_s, burst_e, burst_l (probabilities), delay, jitter (s).
         """
@@ -179,7 +181,7 @@ class Station(Conversation):
         def degrade(uav: int, sender: int) -> None:
             for kind, given in kinds.items():
                 if given:
-                    # A size that is left out is none at all, not the one of last time.
+                    # Reset the sizes that are not given, which would keep the values of the last command.
                     none = _NO_LOSS if kind == "intermittent" else {}
                     self.inject(uav, "radio", kind, sender, at=at, **(none | given))
 
@@ -198,7 +200,7 @@ class Station(Conversation):
         return self._each([uav for uav in self.uavs if a in self.card(uav).in_neighbours], do)
 
     def _each(self, uavs: Iterable[int], do: Callable[[int], object]) -> list[str]:
-        """Do something at each of several UAVs; what went wrong where, unless it went wrong everywhere."""
+        """Call ``do`` for each UAV and return the errors; raise the first one if every call fails."""
         failed: list[StationError] = []
         uavs = list(uavs)
         for uav in uavs:
@@ -219,7 +221,7 @@ class Station(Conversation):
     def lead(
         self, uav: int, *, altitude: float | None = None, speed: float | None = None, at: float | None = None
     ) -> None:
-        """Give a leader another altitude (m) or speed (m/s), at a simulated time (s) or at once."""
+        """Command a leader's altitude (m) or speed (m/s), at a simulated time (s) or now."""
         if altitude is None and speed is None:
             raise StationError("a leader needs an altitude or a speed")
         with _ScheduledAt(self, uav, at):
@@ -230,7 +232,7 @@ class Station(Conversation):
                 self.command(uav, dialect.MAV_CMD_DO_CHANGE_SPEED, dialect.SPEED_TYPE_AIRSPEED, speed, -1.0)
 
     def mode(self, uav: int, mode: str) -> None:
-        """Set the mode: "mission", "hold" or "offboard"."""
+        """Set the flight mode: "mission", "hold" or "offboard"."""
         code = code_of(mode)
         if code is None:
             raise StationError(f"mode {mode}: must be mission, hold or offboard")
@@ -238,8 +240,8 @@ class Station(Conversation):
         self.command(uav, dialect.MAV_CMD_DO_SET_MODE, flags, code >> 16 & 0xFF, code >> 24)
 
     def attitude(self, uav: int, *, bank: float, alpha: float, beta: float = 0.0) -> None:
-        """Have a UAV of an attitude scheme fly another attitude (rad) with respect to its velocity, for good."""
-        # It loads numba, which no other command needs.
+        """Command the attitude (rad) of a UAV relative to its velocity, for attitude schemes; it does not expire."""
+        # Imported here: it loads numba, which no other command needs.
         from ftcc.link.rotation import body_attitude
 
         place = self.request(uav, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
@@ -261,7 +263,7 @@ class Station(Conversation):
 
 
 class _ScheduledAt:
-    """Parameter FTCC_AT for as long as a request lasts."""
+    """Context manager that holds parameter FTCC_AT at a time while a command is sent."""
 
     def __init__(self, station: Station, uav: int, at: float | None) -> None:
         self._station, self._uav = station, uav
@@ -276,12 +278,12 @@ class _ScheduledAt:
 
 
 def _milliseconds(at: float) -> int:
-    """A simulated time (s) in whole ms, as MAVLink has it.
+    """Convert a simulated time (s) to whole ms, the unit of MAVLink.
 
     Raises
     ------
     StationError
-        If it is no time to come, or has a fraction of a ms.
+        If it is negative, too large, or not a whole number of ms.
     """
     if not 0.0 <= at * 1e3 < 2**31:
         raise StationError(f"at = {at:.10g}: must be a simulated time from 0 to {(2**31 - 1) / 1e3} s")

@@ -1,7 +1,7 @@
-"""Reads telemetry: what the station keeps of it is taken from the bytes of a datagram, the rest is left to pymavlink.
+"""Receive and parse telemetry: frequent messages directly from their bytes, others with pymavlink.
 
-A hundred UAVs tell some four thousand messages a second. Those that come again and again are read here; a datagram that
-holds any other, or is not perfect, is read by pymavlink as a whole. Both ways read and refuse the same.
+A hundred UAVs send about four thousand messages per second. The frequent ones are parsed here. If a datagram holds
+any other message, or a damaged frame, pymavlink parses all of it. Both parsers accept and refuse the same messages.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ _HEADER = dialect.HEADER_LEN_V2
 _CHECKSUM = 2
 _LARGEST_DATAGRAM = 4096
 _DATAGRAMS_PER_READ = 1024
-"""Five times what a hundred UAVs send at once: whoever sends without end must not hold the station."""
+"""Five times what a hundred UAVs send at once, so that a flood of datagrams cannot block the station."""
 _RECEIVE_BUFFER = 4 << 20
-"""Room for what arrives while the station is busy, bytes; the kernel may grant less and drops what does not fit."""
+"""Size of the receive buffer, bytes; the kernel may grant less, and drops what does not fit."""
 
 
 class Telemetry(NamedTuple):
-    """A message of a UAV."""
+    """One message of a UAV."""
 
     system: int
     """MAVLink system id."""
     kind: int
     """Message id."""
     frame: bytes
-    """The message as it came."""
+    """The message as received, with header and checksum."""
     name: str = ""
-    """Of a DEBUG_FLOAT_ARRAY."""
+    """Name of a DEBUG_FLOAT_ARRAY."""
     stamp_us: int = 0
-    """Its simulated time; 0 if it has none."""
+    """Simulated time, us; 0 if the message has none."""
     values: tuple[float, ...] = ()
-    """Its numbers; the custom mode of a HEARTBEAT. Nothing of other messages."""
+    """Numbers of a DEBUG_FLOAT_ARRAY, or the custom mode of a HEARTBEAT; else empty."""
 
 
 class TelemetrySocket:
-    """Hears datagrams on a port of loopback, from the ports in ``sources`` alone.
+    """Socket on a loopback port that accepts datagrams only from the ports in ``sources``.
 
     Raises
     ------
@@ -60,14 +60,14 @@ class TelemetrySocket:
         self._sources = frozenset((LOOPBACK, source) for source in sources)
         self._codec = Codec(STATION, 1)
         self.foreign_datagrams = 0
-        """Datagrams dropped because of where they came from."""
+        """Number of datagrams dropped because they came from other ports."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
         self._socket.bind((LOOPBACK, port))
 
     def fileno(self) -> int:
-        """For ``select``."""
+        """Return the descriptor for ``select``."""
         return self._socket.fileno()
 
     def close(self) -> None:
@@ -75,7 +75,7 @@ class TelemetrySocket:
         self._socket.close()
 
     def receive(self) -> Iterator[list[Telemetry]]:
-        """What has arrived, a list a datagram; bad data and values that are not finite are dropped."""
+        """Yield the messages of each datagram that has arrived; drop damaged frames and non-finite values."""
         for _ in range(_DATAGRAMS_PER_READ):
             try:
                 datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
@@ -87,7 +87,7 @@ class TelemetrySocket:
                 self.foreign_datagrams += 1
 
     def parse(self, datagram: bytes) -> list[Telemetry]:
-        """The messages of a datagram, in order."""
+        """Return the messages of a datagram, in order."""
         messages = _parse_frames(datagram)
         if messages is None:
             messages = [_from_pymavlink(message) for message in self._codec.parse(datagram)]
@@ -95,7 +95,7 @@ class TelemetrySocket:
 
 
 def _from_pymavlink(message: Any) -> Telemetry:
-    """What pymavlink has read."""
+    """Convert a message that pymavlink has parsed."""
     system, kind, frame = message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf())
     if kind == HEARTBEAT:
         return Telemetry(system, kind, frame, values=(message.custom_mode,))
@@ -106,7 +106,7 @@ def _from_pymavlink(message: Any) -> Telemetry:
 
 
 def _parse_frames(datagram: bytes) -> list[Telemetry] | None:
-    """The messages of a datagram; None if it is not made of perfect frames of the `_FORMATS` ones alone."""
+    """Return the messages of a datagram; None unless it consists only of intact frames listed in `_FORMATS`."""
     messages = []
     at, end = 0, len(datagram)
     while at < end:
@@ -121,7 +121,7 @@ def _parse_frames(datagram: bytes) -> list[Telemetry] | None:
         if checksum != datagram[stop] | datagram[stop + 1] << 8:
             return None
         frame = datagram[at : stop + _CHECKSUM]
-        # Zeros at the end of a payload are not sent.
+        # MAVLink truncates zeros at the end of a payload.
         message = format_.read(datagram[at + 5], format_.kind, frame, datagram[begin:stop].ljust(format_.size, b"\0"))
         if message is None:
             return None
@@ -131,15 +131,15 @@ def _parse_frames(datagram: bytes) -> list[Telemetry] | None:
 
 
 class _Format(NamedTuple):
-    """A message that is read here."""
+    """How to parse one kind of message here."""
 
     kind: int
     size: int
-    """Bytes of its payload."""
+    """Length of the full payload, bytes."""
     seed: bytes
-    """What its checksum ends with (CRC_EXTRA)."""
+    """Last byte of the checksummed data (CRC_EXTRA)."""
     read: Callable[[int, int, bytes, bytes], Telemetry | None]
-    """Of system, kind, frame and whole payload; None where a value is not finite."""
+    """Function of system, kind, frame and full payload; returns None if a value is not finite."""
 
 
 def _format(message: Any, read: Callable[[int, int, bytes, bytes], Telemetry | None]) -> tuple[int, _Format]:
@@ -149,7 +149,7 @@ def _format(message: Any, read: Callable[[int, int, bytes, bytes], Telemetry | N
 _STATE = struct.Struct("<I6f")
 """ATTITUDE and LOCAL_POSITION_NED."""
 _HUD = struct.Struct("<4f")
-"""The floats of VFR_HUD, which it begins with."""
+"""The four floats at the beginning of VFR_HUD."""
 _ARRAY = struct.Struct("<QH10s58f")
 
 
@@ -171,7 +171,7 @@ def _parse_unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> T
 
 
 def _parser_with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], Telemetry]:
-    """What reads whole numbers that begin with their time, of so many octets and us a unit."""
+    """Return a parser of integer messages whose time comes first, in ``octets`` bytes and units of ``unit`` us."""
 
     def read(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry:
         return Telemetry(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))

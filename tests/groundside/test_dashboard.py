@@ -297,9 +297,9 @@ def test_a_uav_that_falls_silent_is_said_to_be(tmp_path: Path) -> None:
         dashboard.log(Snapshot(snap.t, uavs | {5: silent}, snap.events))
     dashboard.close()
     assert at(tmp_path / "swarm.rrd", "/world/uav/5/label", "Points3D:labels", 4.0) == ["UAV 5: silent since 1 s"]
-    assert at(tmp_path / "swarm.rrd", "/world/uav/6/label", "Points3D:labels", 4.0) == ["UAV 6: not heard"]
+    assert at(tmp_path / "swarm.rrd", "/world/uav/6/label", "Points3D:labels", 4.0) == ["UAV 6: no telemetry"]
     notes = at(tmp_path / "swarm.rrd", "/graph/notes", "Points2D:labels", 4.0)
-    assert notes == ["not heard yet"] * len(GRAPH.senders(6)), "what UAV 5 hears, nobody knows"
+    assert notes == ["none received"] * len(GRAPH.senders(6)), "the links to UAV 5 are unknown"
     assert np.isnan(at(tmp_path / "swarm.rrd", "/plots/motion/z/uavs", "Scalars:scalars", 4.0)[5])
 
 

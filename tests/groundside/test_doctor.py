@@ -41,7 +41,7 @@ def test_who_wants_whatever_can_be_had_hears_the_limit():
 
 def test_a_flight_that_fails_or_is_too_short_says_so():
     assert judge_prediction("demo", flown(LIMITED, "not ready after 300 s"), 1.0).verdict == "not ready after 300 s"
-    assert judge_prediction("demo", flown(Pace(math.nan, None)), 1.0).found == "too short to tell"
+    assert judge_prediction("demo", flown(Pace(math.nan, None)), 1.0).found == "too short to measure"
 
 
 def test_what_has_an_ideal_exchange_is_not_flown_with_processes():

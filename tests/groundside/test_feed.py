@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ftcc.groundside import feed as feed_module
+from ftcc.groundside.dashboard import feed as feed_module
 from ftcc.groundside.dashboard.feed import Feed, decode, encode, feed_path, watch_swarm
 from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot
 from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from ftcc.groundside import registry
 from ftcc.groundside.cli.app import main
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.swarm import registry
 from ftcc.groundside.swarm.open_files import TooFewFilesError, files_needed, provide_files
 
 
