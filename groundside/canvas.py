@@ -1,4 +1,4 @@
-"""matplotlib as all figures use it: into files, without a display, and also where there is no home for its fonts."""
+"""Import matplotlib for figures in files: without a display, and with a cache folder that is always writable."""
 
 from __future__ import annotations
 

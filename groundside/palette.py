@@ -1,4 +1,4 @@
-"""Colours, the same in the dashboard and in the figures: middle tones, readable on white and on black."""
+"""Colours of the dashboard and of figures: middle tones, readable on white and on black."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ __all__ = ["CUT", "FIRE", "FRESH", "GRAY", "STALE", "Color", "colors", "hexadeci
 Color = tuple[int, int, int]
 
 GRAY: Color = (128, 132, 138)
-"""Bounds, limits and what belongs to nobody."""
+"""Bounds, limits and everything that belongs to no UAV."""
 FRESH: Color = (122, 134, 126)
 STALE: Color = (224, 160, 20)
 CUT: Color = (226, 48, 48)
-"""Edges over which the receiver hears news, hears none, and cannot hear any."""
+"""Links with fresh records, with none lately, and cut ones."""
 FIRE: Color = (222, 84, 40)
 
 _PALETTE: tuple[Color, ...] = (
@@ -27,11 +27,11 @@ _PALETTE: tuple[Color, ...] = (
     (146, 140, 40),
     (108, 120, 148),
 )
-"""Of UAVs; red and amber are left to the edges."""
+"""Colours of UAVs; red and amber are reserved for links."""
 
 
 def colors(uavs: Iterable[int]) -> dict[int, Color]:
-    """One colour for each UAV; beyond eight, hues a golden angle apart."""
+    """Return a colour for each UAV; beyond eight, hues a golden angle apart."""
     chosen = dict(zip(sorted(uavs), _PALETTE, strict=False))
     for i, uav in enumerate(sorted(uavs)[len(_PALETTE) :]):
         r, g, b = colorsys.hls_to_rgb((0.09 + 0.618034 * i) % 1.0, 0.5, 0.45)
@@ -40,5 +40,5 @@ def colors(uavs: Iterable[int]) -> dict[int, Color]:
 
 
 def hexadecimal(color: Color) -> str:
-    """``#rrggbb``."""
+    """Return a colour as ``#rrggbb``."""
     return "#{:02x}{:02x}{:02x}".format(*color)

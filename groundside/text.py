@@ -1,4 +1,4 @@
-"""Words that several pages and tables use."""
+"""Format text that several pages and tables use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["ids"]
 
 
 def ids(uavs: Iterable[int]) -> str:
-    """Ids in short: 1-6, 8."""
+    """Return ids in short form, such as 1-6, 8."""
     runs: list[list[int]] = []
     for uav in sorted(uavs):
         if runs and uav == runs[-1][-1] + 1:

@@ -1,4 +1,4 @@
-"""Runs beside each other: the same figures with a colour per run, and one table of claims."""
+"""Compare runs: the same figures with a colour per run, and one table of claims."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["Comparison", "labels_of"]
 
 
 Key = tuple[str, str, tuple[float, float]]
-"""What makes a claim of several scenarios or cases the same."""
+"""Name, signal and window, which identify a claim across scenarios and cases."""
 
 
 def labels_of(runs: Sequence[Run]) -> list[str]:
-    """What tells runs apart: the scenario and the case where these do, else the folder too."""
+    """Return labels that distinguish the runs: scenario and case, and the folder if these are equal."""
     scenarios = {run.mission.name for run in runs}
     labels = []
     for run in runs:
@@ -53,7 +53,7 @@ class Comparison:
         self.table = self._table()
 
     def _table(self) -> list[tuple[Result, list[Result | None]]]:
-        """Each claim that some run makes, and what every run shows of it; the verdict only where it was made."""
+        """Return each claim of any run with the results of all runs; a run that does not make it has no verdict."""
         claims: dict[Key, Result] = {}
         shown: dict[Key, list[Result | None]] = {}
         made: set[Key] = set()
@@ -71,7 +71,7 @@ class Comparison:
         return [(claims[key], shown[key]) for key in claims if key in made]
 
     def rows(self) -> tuple[list[Head], list[list[Cell]]]:
-        """The table: a column per run; expected values stand behind the measured ones."""
+        """Return the table, a column per run; expected values follow the measured ones."""
         heads = [Head("claim"), Head("window, s"), *(Head(label, True) for label in self.labels)]
         rows = []
         for claim, results in self.table:
@@ -84,7 +84,7 @@ class Comparison:
         return heads, rows
 
     def write(self, folder: Path) -> Path:
-        """Draw the figures and write the page; refused where another process is writing one."""
+        """Draw the figures and write the page; refuse if another process is writing one."""
         with sole_writer(folder):
             return self._write(folder)
 
@@ -104,7 +104,7 @@ class Comparison:
             figures=draw_figures(sheet_of(first), flights, folder),
             figures_note="A colour per run; all UAVs of a run have the colour of the run.",
         )
-        after = ["Where a scenario claims nothing for a case, the value stands without a verdict."]
+        after = ["A value has no verdict if the scenario makes no claim for that case."]
         page.sections.append(Section("claims", "Claims", heads=heads, rows=rows, after=after))
         return write(page, folder / "index.html")
 

@@ -1,4 +1,4 @@
-"""What a figure shows of a flight: curves of expressions, and whether the flight has them."""
+"""Evaluate the curves of a figure from a flight, and check whether the flight has them."""
 
 from __future__ import annotations
 
@@ -35,14 +35,15 @@ class Flown:
 class Curve:
     """One curve of a panel."""
 
-    who: str
+    name: str
+    """"UAV 1", or "1 - 2" for a difference."""
     uav: int
     x: Array
     y: Array
 
 
 def drawable(panel: Panel, flight: Flown) -> bool:
-    """Whether a flight has all that a panel shows, and reaches its window."""
+    """Return whether a flight has all columns of a panel, and reaches its window."""
     expressions = [e for e in (panel.y, panel.x, panel.bound, panel.true, panel.reference) if e is not None]
     return has_columns(flight, expressions, panel.pairs) and (
         panel.window is None or last_time(flight) > panel.window[0]
@@ -50,7 +51,7 @@ def drawable(panel: Panel, flight: Flown) -> bool:
 
 
 def has_columns(flight: Flown, expressions: Sequence[str], pairs: Sequence[tuple[int, int]] | None) -> bool:
-    """Whether a flight has the columns and the UAVs that ``expressions`` and ``pairs`` name."""
+    """Return whether a flight has the columns and UAVs that ``expressions`` and ``pairs`` name."""
     graph = flight.mission.graph
     known = {"t", *flight.signals.names, *(DERIVED if graph.leaders else ())}
     others = {uav for expression in expressions for uav in uavs_in(expression)}
@@ -59,13 +60,13 @@ def has_columns(flight: Flown, expressions: Sequence[str], pairs: Sequence[tuple
 
 
 def last_time(flight: Flown) -> float:
-    """Last recorded time of anybody, s; -1 if nothing was recorded."""
+    """Return the last recorded time of any UAV, s; -1 if nothing was recorded."""
     times = [flight.signals.column("t", uav) for uav in flight.signals.uavs]
     return max((float(t[-1]) for t in times if len(t)), default=-1.0)
 
 
 def uavs_of(uavs: Sequence[int] | str, mission: Mission) -> tuple[int, ...]:
-    """Ids for "followers", "leaders", "all" or a list."""
+    """Return the ids of "followers", "leaders", "all" or a list."""
     if isinstance(uavs, str):
         graph = mission.graph
         return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[uavs]
@@ -80,7 +81,7 @@ def curves_of(
     window: tuple[float, float] | None = None,
     x: str = "t",
 ) -> Iterator[Curve]:
-    """An expression over a flight, a curve per UAV (or per pair: the difference); only where there are rows."""
+    """Yield an expression as a curve per UAV, or the difference per pair; UAVs without rows are left out."""
     graph = flight.mission.graph
     compared = [(uav, None) for uav in uavs_of(uavs, flight.mission)] if pairs is None else list(pairs)
     for uav, other in compared:
@@ -88,12 +89,12 @@ def curves_of(
         if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
             continue
         values = evaluated(y, flight.signals, graph, uav)
-        who = f"UAV {uav}"
+        name = f"UAV {uav}"
         if other is not None:
             theirs = evaluated(y, flight.signals, graph, other)
             rows = min(len(values), len(theirs))
-            t, values, who = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
+            t, values, name = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
         along = t if x == "t" else evaluated(x, flight.signals, graph, uav)[: len(t)]
         rows_ = window_of(t, window) if window is not None else slice(None)
         if len(t[rows_]):
-            yield Curve(who, uav, along[rows_], values[rows_])
+            yield Curve(name, uav, along[rows_], values[rows_])

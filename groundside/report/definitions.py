@@ -1,7 +1,7 @@
-"""What the figures of a scheme are: sheets of figures as data, and figures for a scheme without a sheet.
+"""Define the figures of a scheme: sheets of figures as data, and default figures for a scheme without a sheet.
 
-A sheet, ``figures/SCHEME.toml``, lists the figures of the monograph's chapter with their quantities, and what the
-monograph reads off them, so that a run can be held against it.
+A sheet, ``figures/SCHEME.toml``, lists the figures of the monograph's chapter with their quantities and the values that
+the monograph reads off them, so that a run can be compared with it.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ class Panel(Strict):
     pairs: list[tuple[Id, Id]] | None = Field(None, description="draw y of the first minus y of the second instead")
     bound: str | None = Field(None, description="expression; drawn dashed at plus and minus its value")
     true: str | None = Field(None, description="expression of the true value that y estimates; drawn thin and dark")
-    reference: str | None = Field(None, description="expression of what y follows; drawn thin in the same colour")
+    reference: str | None = Field(None, description="expression of the reference of y; drawn thin in the same colour")
     limits: str | None = Field(None, description="actuator whose limits are drawn")
     window: tuple[float, float] | None = Field(None, description="s; a detail, beside the others")
     equal: bool = Field(False, description="both axes to the same scale")
-    unwrap: bool = Field(False, description="y is an angle that goes on beyond half a turn; unit rad or deg")
+    unwrap: bool = Field(False, description="draw y, an angle, without jumps by a turn; unit rad or deg")
     shared: bool = Field(False, description="y is the same for all UAVs: one curve, of the first")
     surroundings: Literal["obstacles", "fire"] | None = Field(
         None, description='"obstacles" where x is the forward position and y the altitude; "fire" on a map, north up'
@@ -56,7 +56,7 @@ class Panel(Strict):
 
     @property
     def turn(self) -> float | None:
-        """A whole turn in the unit of y, where y is drawn without jumps of one."""
+        """Return a whole turn in the unit of y if y is unwrapped; else None."""
         return _TURNS[self.unit] if self.unwrap else None
 
     @model_validator(mode="after")
@@ -67,7 +67,7 @@ class Panel(Strict):
 
 
 class Reading(Strict):
-    """What the monograph reads off a figure, held against the extremes of an expression in a window."""
+    """Values that the monograph reads off a figure, compared with the extremes of an expression in a window."""
 
     what: str
     y: str
@@ -81,7 +81,7 @@ class Reading(Strict):
         description='"extremes": both values are reached; "within": an axis or a bound that holds all; "lowest" and '
         '"highest": the lowest or highest value lies between the two',
     )
-    remark: str = Field("", description="a difference that is known, and its cause")
+    remark: str = Field("", description="a known difference, and its cause")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -91,13 +91,13 @@ class Reading(Strict):
 
 
 class Figure(Strict):
-    """A figure: panels below one another, details beside each other under them."""
+    """A figure: panels in a column, and below them details side by side."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$", description="of its files")
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="name of its files")
     title: str
     number: str = Field("", description="in the monograph")
     panels: list[Panel] = Field(min_length=1)
-    columns: int = Field(1, ge=1, le=3, description="of the panels that are no details")
+    columns: int = Field(1, ge=1, le=3, description="columns of the panels that are no details")
     readings: list[Reading] = []
 
 
@@ -105,9 +105,9 @@ class Sheet(Strict):
     """The figures of a scheme."""
 
     source: str = Field("", description="chapter of the monograph")
-    scenarios: list[str] = Field([], description="names of the scenarios that fly what the monograph shows")
+    scenarios: list[str] = Field([], description="names of the scenarios that reproduce the monograph")
     figures: list[Figure] = Field(min_length=1)
-    notes: list[str] = Field([], description="what of the monograph is not drawn or cannot be compared, and why")
+    notes: list[str] = Field([], description="parts of the monograph that are not drawn or cannot be compared, and why")
 
 
 def read_sheet(path: Path) -> Sheet:
@@ -116,19 +116,19 @@ def read_sheet(path: Path) -> Sheet:
     Raises
     ------
     UserError
-        That names the file, the field and the value.
+        With the file, the field and the value.
     """
     try:
         return Sheet.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path}: is no TOML: {error}") from None
+        raise UserError(f"{path}: not valid TOML: {error}") from None
     except ValidationError as error:
         wrong = "\n".join(f"  {'.'.join(map(str, e['loc']))} = {e['input']!r}: {e['msg']}" for e in error.errors())
         raise UserError(f"{path}:\n{wrong}") from None
 
 
 def sheet_of(mission: Mission) -> Sheet:
-    """The sheet of a mission's scheme: the one that is shipped, or a plain one."""
+    """Return the sheet of a mission's scheme: the bundled one, or a default one."""
     path = _FOLDER / f"{mission.scheme.name}.toml"
     return read_sheet(path) if path.is_file() else plain_sheet(mission)
 
@@ -138,11 +138,11 @@ _PLANES = {
     "attitude": (("mu", "bank", "rad"), ("alpha", "angle of attack", "rad"), ("beta", "sideslip", "rad")),
     "position": (("x", "north", "m"), ("y", "east", "m"), ("z", "altitude", "m"), ("V", "airspeed", "m/s")),
 }
-"""What tells how an aircraft flies, by plant."""
+"""States in the default motion figure, by plant."""
 
 
 def plain_sheet(mission: Mission) -> Sheet:
-    """Figures from what a scheme declares: motion, errors with their bounds, commands with their limits, estimates."""
+    """Return default figures from a scheme's signals: motion, errors with bounds, commands with limits, estimates."""
     motion = [
         Panel(y=name, label=meaning, unit=unit, uavs="all", unwrap=unit == "rad")
         for name, meaning, unit in _PLANES[mission.scheme.plant]
@@ -169,7 +169,7 @@ def plain_sheet(mission: Mission) -> Sheet:
 
 
 def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
-    """What is wrong with a sheet's expressions, given the columns of a recording."""
+    """Return the errors in a sheet's expressions, given the columns of a recording."""
     wrong = []
     for figure in sheet.figures:
         expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]

@@ -1,4 +1,4 @@
-"""Draws figures with matplotlib, all in one style: SVG for the page, PDF and PNG for papers and slides."""
+"""Draw figures with matplotlib in one style: SVG for the page, PDF and PNG for papers and slides."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ __all__ = ["Drawn", "draw", "draw_timeline", "figure_of", "save"]
 Array = NDArray[np.float64]
 
 _INK = "#010203"
-"""Stands for the colour of text: the page replaces it by its own, so that a figure suits light and dark."""
+"""Placeholder for the text colour, which the page replaces by its own, so that figures suit light and dark."""
 _WIDTH, _ROW, _LEGEND = 7.2, 1.9, 0.35
-"""Inches: of a figure, of a row of panels, of the legend."""
+"""Width of a figure, height of a row of panels, height of the legend, inches."""
 _TALL = 2.0
 """Height of a row with equal axes, in rows."""
 _IN_A_ROW = 3
-"""Details beside each other."""
+"""Largest number of details in a row."""
 _TICKS_OF_A_DETAIL = 4
-"""Intervals on the time axis of a detail at most: more labels would touch."""
+"""Largest number of intervals on the time axis of a detail; more labels would overlap."""
 _FAR = 3.0
-"""How far beyond the curves a limit may be and still be drawn, in heights of the axes."""
+"""Largest distance of a drawn limit from the curves, in heights of the axes."""
 _COLUMNS = 700
-"""Columns of a figure's width, of each of which the least and the greatest value are drawn."""
+"""Number of parts of a curve; of each the least and the greatest value are drawn."""
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
-"""Of runs that are compared."""
+"""Colours of compared runs."""
 
 _STYLE: Any = {
     "font.family": "sans-serif",
@@ -80,7 +80,7 @@ _STYLE: Any = {
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure that was drawn."""
+    """A drawn figure and its files."""
 
     name: str
     title: str
@@ -89,22 +89,22 @@ class Drawn:
     files: tuple[Path, ...]
 
 
-def draw(asked: Sequence[Panel], flights: Sequence[Flown], beside: int = 1) -> Any | None:
-    """Panels of one flight, colours by UAV, or of several, colours by flight; None if none has what they show.
+def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1) -> Any | None:
+    """Draw panels of one flight, coloured by UAV, or of several, coloured by flight; None if no flight has the data.
 
-    Details stand in a row of their own; of the other panels ``beside`` ones stand beside each other.
+    Details are placed in rows of their own, other panels in ``columns`` columns.
     """
-    panels = [panel for panel in asked if any(drawable(panel, flight) for flight in flights)]
+    panels = [panel for panel in candidates if any(drawable(panel, flight) for flight in flights)]
     if not panels:
         return None
     with plt.rc_context(_STYLE):
         wide = [i for i, panel in enumerate(panels) if panel.window is None]
         details = [i for i, panel in enumerate(panels) if panel.window is not None]
-        rows = [wide[i : i + beside] for i in range(0, len(wide), beside)]
+        rows = [wide[i : i + columns] for i in range(0, len(wide), columns)]
         rows += [details[i : i + _IN_A_ROW] for i in range(0, len(details), _IN_A_ROW)]
-        columns = int(np.lcm.reduce([len(row) for row in rows]))
+        width = int(np.lcm.reduce([len(row) for row in rows]))
         heights = [_TALL if any(panels[i].equal for i in row) else 1.0 for row in rows]
-        mosaic: Any = [[str(i) for i in row for _ in range(columns // len(row))] for row in rows]
+        mosaic: Any = [[str(i) for i in row for _ in range(width // len(row))] for row in rows]
         size = (_WIDTH, _LEGEND + _ROW * sum(heights))
         figure, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
         for i, panel in enumerate(panels):
@@ -149,7 +149,7 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
 
 
 def _draw_limits(axes: Axes, actuator: str, flight: Flown) -> None:
-    """An actuator's limits, unless they are so far away that nothing else could be seen."""
+    """Draw an actuator's limits, unless they are too far from the curves."""
     follower = next(spec for spec in flight.mission.vehicles if spec.kind != "reference_point")
     low, high = axes.get_ylim()
     for limit in follower.limits[SLOT[actuator]]:
@@ -158,7 +158,7 @@ def _draw_limits(axes: Axes, actuator: str, flight: Flown) -> None:
 
 
 def _draw_surroundings(axes: Axes, kind: str, flight: Flown) -> None:
-    """Obstacles as blocks; the fire's front in the beginning (dashed) and in the end."""
+    """Draw obstacles as blocks, or the fire's first front (dashed) and its last one."""
     if kind == "obstacles":
         low, _ = axes.get_ylim()
         for start, end, top in flight.mission.obstacles:
@@ -177,7 +177,7 @@ def _draw_surroundings(axes: Axes, kind: str, flight: Flown) -> None:
 
 
 def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
-    """Bounds dashed, both ways; true values dotted in the colour of text; references thin."""
+    """Draw positive and negative bounds dashed, true values dotted, references thin."""
     tints = colors(flight.mission.uavs)
     if panel.reference is not None:
         begins = {c.uav: c.y for c in curves_of(panel.y, flight, panel.uavs, None, panel.window, panel.x)}
@@ -255,7 +255,7 @@ def _uav_entries(panels: Sequence[Panel], flight: Flown) -> list[Line2D]:
 
 
 def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: float) -> Any | None:
-    """Events by time, a row per UAV and one for what concerns all; None if nothing happened."""
+    """Draw events over time, a row per UAV and one for the whole swarm; None if there are no events."""
     marked = [event for event in events if 0.0 <= float(event["t"]) <= max(last, 0.0)]
     if not marked:
         return None
@@ -284,7 +284,7 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
 
 
 def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
-    """Curves (name, colour, times, values) of quantities that are never negative, against time, from zero up."""
+    """Draw curves (name, colour, times, values) of non-negative quantities over time, with the axis from zero."""
     with plt.rc_context(_STYLE):
         figure, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
         for name, color, t, y in curves:
@@ -302,7 +302,7 @@ def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn
     buffer = io.StringIO()
     files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
     with plt.rc_context(_STYLE):
-        # The layout is found once, not once for each format.
+        # Compute the layout once, not for each format.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
         figure.savefig(buffer, format="svg", metadata={"Date": None})
@@ -314,12 +314,12 @@ def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn
 
 
 def _small(svg: str) -> str:
-    """Coordinates of curves to a tenth of a point."""
+    """Round the coordinates of curves to a tenth of a point."""
     return re.sub(r'\bd="[^"]+"', lambda path: re.sub(r"(\d+\.\d)\d+", r"\1", path[0]), svg)
 
 
 def _for_page(svg: str, title: str, name: str) -> str:
-    """An SVG as an element of a page: text in the page's colour, ids of its own, a title for who cannot see it."""
+    """Convert an SVG file to an element of a page: text in the page's colour, unique ids, a title."""
     body = svg[svg.index("<svg") :].replace(_INK, "currentColor")
     body = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', body)
     body = re.sub(r'(xlink:href="|url\()#', rf"\1#{name}-", body)
@@ -332,7 +332,7 @@ def _for_page(svg: str, title: str, name: str) -> str:
 
 
 def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """A curve's least and greatest value in each of `_COLUMNS` parts: looks the same, and is small."""
+    """Keep a curve's least and greatest value in each of `_COLUMNS` parts, which looks the same but is smaller."""
     if len(y) <= 2 * _COLUMNS:
         return x, y
     edges = np.linspace(0, len(y), _COLUMNS + 1).astype(int)

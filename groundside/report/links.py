@@ -1,4 +1,4 @@
-"""What a run recorded of its links: a table of edges, and how old was what each UAV heard."""
+"""Report the links of a run: a table of edges, and the age of received states."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ __all__ = ["links_section"]
 
 
 def links_section(links: dict[str, Any], mission: Mission, folder: Path) -> Section:
-    """Records sent, received and lost on each edge, and their age; a run without any says so."""
+    """Return a table of records sent, received and lost on each edge, and their age."""
     if not len(links["t"]):
-        return Section("links", "Links", before=["Nothing was recorded of the links."])
+        return Section("links", "Links", before=["The run recorded no links."])
     rows = []
     for receiver in mission.uavs:
         for sender in mission.graph.senders(receiver):
@@ -32,8 +32,8 @@ def links_section(links: dict[str, Any], mission: Mission, folder: Path) -> Sect
     heads += [Head("not delivered", True), Head("mean age, s", True), Head("greatest age, s", True)]
     end = float(links["t"].max())
     before = [
-        f"As the receivers counted until {end:g} s. Lost: by the emulated channel, cuts included. Not delivered: what "
-        "the mesh itself did not bring, which only an overloaded computer shows."
+        f"Counted by the receivers until {end:g} s. Lost: dropped by the emulated channel, including cuts. Not "
+        "delivered: missing in the mesh itself, which happens only on an overloaded computer."
     ]
     return Section("links", "Links", before, svg=_ages(links, mission, folder), heads=heads, rows=rows)
 
@@ -42,9 +42,9 @@ def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:
     sent, received, lost = (int(edge[name][-1]) for name in ("sent", "received", "lost"))
     missing = sent - received - lost
     share = f" ({100.0 * lost / sent:.1f} %)" if lost else ""
-    heard = np.isfinite(edge["age"])
-    mean = f"{edge['age'][heard].mean():.3f}" if heard.any() else "never heard"
-    greatest = f"{edge['oldest'][heard].max():.3f}" if heard.any() else ""
+    known = np.isfinite(edge["age"])
+    mean = f"{edge['age'][known].mean():.3f}" if known.any() else "none received"
+    greatest = f"{edge['oldest'][known].max():.3f}" if known.any() else ""
     return [
         Cell(f"UAV {sender}"),
         Cell(f"UAV {receiver}"),
@@ -58,7 +58,7 @@ def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:
 
 
 def _ages(links: dict[str, Any], mission: Mission, folder: Path) -> str:
-    """The greatest age of what each UAV heard of any neighbour, by time."""
+    """Draw the greatest age of neighbour states at each UAV over time."""
     tints = colors(mission.uavs)
     curves = []
     for uav in mission.uavs:
@@ -70,5 +70,5 @@ def _ages(links: dict[str, Any], mission: Mission, folder: Path) -> str:
             curves.append((f"UAV {uav}", hexadecimal(tints[uav]), t, oldest))
     if not curves:
         return ""
-    made = figure_of(curves, "greatest age heard, s")
-    return save(made, "links", "Greatest age of what each UAV heard", "", folder).svg
+    made = figure_of(curves, "greatest age received, s")
+    return save(made, "links", "Greatest age of received neighbour states", "", folder).svg

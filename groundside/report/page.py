@@ -1,4 +1,4 @@
-"""The report as one page: verdict, claims, figures, what the monograph shows, events, links. Needs no network."""
+"""Write the report as one page that needs no network: verdict, claims, figures, comparison, events, links."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Head:
-    """Heading of a column; numbers stand to the right."""
+    """Heading of a column; numbers are aligned right."""
 
     text: str
     number: bool = False
@@ -40,7 +40,7 @@ class Head:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell, perhaps marked: "holds", "fails", "open", "warning" or "error"."""
+    """A cell with an optional mark: "holds", "fails", "open", "warning" or "error"."""
 
     text: str
     mark: str = ""
@@ -48,7 +48,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Section:
-    """A table with words around it, and perhaps a figure."""
+    """A table with text around it, and an optional figure."""
 
     anchor: str
     title: str
@@ -61,7 +61,7 @@ class Section:
 
 @dataclass
 class Page:
-    """What the page is made of, in order."""
+    """Content of the page, in order."""
 
     title: str
     subtitle: str
@@ -74,7 +74,7 @@ class Page:
 
     @property
     def contents(self) -> list[tuple[str, str]]:
-        """Anchors and titles."""
+        """Return anchors and titles of the sections."""
         found = [(section.anchor, section.title) for section in self.sections]
         if self.figures:
             before = sum(anchor in ("verdict", "claims") for anchor, _ in found)
@@ -85,7 +85,7 @@ class Page:
 
 
 def write(page: Page, path: Path) -> Path:
-    """Write a page as HTML that holds everything it shows."""
+    """Write a page as one HTML file that includes its figures, and return its path."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -98,7 +98,7 @@ def write(page: Page, path: Path) -> Path:
 
 
 def verdict_section(verdict: Verdict) -> Section:
-    """How the flight went: the word and what led to it, then all that was found."""
+    """Return the verdict, its reasons, and all findings."""
     mark = {AS_IT_SHOULD: "holds", REMARKS: "warning", FAILED: "fails"}[verdict.word]
     rows = [[Cell("verdict"), Cell(""), Cell(verdict.word, mark), Cell("")]]
     rows += [[Cell(""), Cell(""), Cell(text, "error"), Cell("")] for text in verdict.failures]
@@ -126,7 +126,7 @@ _VERDICTS = {True: Cell("holds", "holds"), False: Cell("fails", "fails"), None: 
 
 
 def claims_section(results: Sequence[Result], case: str) -> Section:
-    """The claims of the scenario: what was expected, what was measured."""
+    """Return the claims of the scenario with expected and measured values."""
     if not results:
         return Section("claims", "Claims", before=[f"The scenario makes no claims for case {case}."])
     rows = []
@@ -156,7 +156,7 @@ def claims_section(results: Sequence[Result], case: str) -> Section:
 def compared_section(
     compared: Iterable[Compared], source: str, form: str, variants: Sequence[str], notes: Sequence[str]
 ) -> Section:
-    """What the monograph shows against what the run shows, differences included."""
+    """Return the comparison of the run with the monograph."""
     rows = []
     agreed = differing = 0
     for one in compared:
@@ -167,14 +167,14 @@ def compared_section(
         cells = [Cell(one.figure), Cell(one.what), Cell(one.monograph + unit), Cell(one.measured + unit)]
         rows.append([*cells, verdict, Cell(one.difference)])
     before = [
-        f"What {source} shows in its figures and says of them, against this run: {agreed} of {len(rows)} agree, "
-        f"{differing} differ. A value that is read off a plot agrees within a quarter of its range."
+        f"Values in the figures and the text of {source}, compared with this run: {agreed} of {len(rows)} agree, "
+        f"{differing} differ. A value read off a plot agrees within a quarter of its range."
     ]
     if form != "monograph" or variants:
         what = f"form {form}" + (f", variant {', '.join(variants)}" if variants else "")
         before.append(
             f"This run flew {what}; the monograph simulates the printed law in continuous time with ideal exchange "
-            "(form monograph), so that differences are to be expected."
+            "(form monograph); differences are expected."
         )
     heads = [
         Head("figure"),
@@ -188,9 +188,9 @@ def compared_section(
 
 
 def events_section(events: Sequence[dict[str, Any]], svg: str) -> Section:
-    """What happened, as a time line and a list."""
+    """Return the events, as a timeline and a list."""
     if not events:
-        return Section("events", "Events", before=["None were recorded."])
+        return Section("events", "Events", before=["No events were recorded."])
     rows = []
     for event in events:
         severity = str(event.get("severity", "info"))
@@ -203,5 +203,5 @@ def events_section(events: Sequence[dict[str, Any]], svg: str) -> Section:
 
 
 def plural(count: int, what: str) -> str:
-    """1 UAV, 2 UAVs."""
+    """Return a count with its noun: 1 UAV, 2 UAVs."""
     return f"{count} {what}" + ("" if count == 1 else "s")

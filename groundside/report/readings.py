@@ -1,4 +1,4 @@
-"""Holds a run against what the monograph shows: the values that its text and its axes tell."""
+"""Compare a run with the monograph: with values that its text and its axes give."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ftcc.groundside.report.definitions import Reading, Sheet
 __all__ = ["Compared", "compare"]
 
 _NEAR = 0.25
-"""How far a value may be from one that was read off a plot, as a share of the values' span."""
+"""Allowed difference from a value read off a plot, as a share of the span of values."""
 _INSIDE = 0.02
-"""How far a value may be beyond an axis, likewise: ticks are rounded."""
+"""Allowed excess beyond an axis, as a share of its span; ticks are rounded."""
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A reading held against a run."""
+    """A reading compared with a run."""
 
     figure: str
     what: str
@@ -29,12 +29,12 @@ class Compared:
     monograph: str
     measured: str
     agrees: bool | None
-    """None where the run does not show it."""
+    """None if the run has no such value."""
     difference: str
 
 
 def compare(sheet: Sheet, flight: Flown) -> Iterator[Compared]:
-    """All readings of a sheet held against a flight."""
+    """Compare all readings of a sheet with a flight."""
     for figure in sheet.figures:
         for reading in figure.readings:
             yield _compared(figure.number, reading, flight)
@@ -74,7 +74,7 @@ def _compared(number: str, reading: Reading, flight: Flown) -> Compared:
 
 
 def _span(low: float, high: float) -> str:
-    """An interval with the digits that its width deserves."""
+    """Format an interval with digits that suit its width."""
     width = high - low
     if width <= 1e-12 * max(abs(low), abs(high), 1.0):
         return f"{low:.5g}"

@@ -1,4 +1,4 @@
-"""Writes a run's report: ``report/index.html`` and its figures, from whatever of the run there is."""
+"""Write a run's report: ``report/index.html`` and its figures, also for an incomplete run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ __all__ = ["draw_figures", "write_report"]
 
 
 class _EmptyRecording:
-    """A recording without a row."""
+    """A recording without rows."""
 
     uavs: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
@@ -47,12 +47,12 @@ class _EmptyRecording:
 def write_report(run: Run, folder: Path | None = None) -> Path:
     """Write the report of a run, complete or not, and return its page.
 
-    A run that recorded nothing has a report that says so: its scenario, its events, its claims as not flown.
+    The report of a run without a recording has its scenario, its events, and its claims marked as not flown.
 
     Raises
     ------
     BusyFolderError
-        If another process is writing one there.
+        If another process is writing a report there.
     """
     with sole_writer(folder or run.path / "report"):
         return _write(run, folder or run.path / "report")
@@ -65,7 +65,7 @@ def _write(run: Run, folder: Path) -> Path:
         signals: Any = run
         end = run.end
     except NothingRecordedError as error:
-        notes.append(f"{error}. What follows is what the scenario says and what was logged.")
+        notes.append(f"{error}. The report shows the scenario and the log only.")
         signals, end = _EmptyRecording(), 0.0
     events = run.events
     results = evaluate(signals, mission.claims, mission.case, mission.graph)
@@ -98,9 +98,9 @@ def _write(run: Run, folder: Path) -> Path:
 
 
 def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path) -> list[Drawn]:
-    """Draw and write all figures of a sheet of which the flights have something.
+    """Draw and write all figures of a sheet for which the flights have data.
 
-    Details show instants of the sheet's own scenarios and are left out for others.
+    Details show time windows of the sheet's own scenarios; they are left out for other scenarios.
     """
     drawn = []
     own = all(flight.mission.name in sheet.scenarios for flight in flights)
@@ -142,11 +142,11 @@ def _facts(run: Run, mission: Mission, end: float, results: Sequence[Result]) ->
 
 
 def _pace(run: Run) -> list[tuple[str, str]]:
-    """How many times real time a swarm of processes flew, and what limited it at last."""
+    """Return the pace of a swarm of processes, and what limited it."""
     over = next((event for event in reversed(run.events) if event.get("factor")), None)
     if over is None:
         return []
-    asked = "as fast as possible" if over["asked"] is None else f"asked for {over['asked']:g}"
+    asked = "as fast as possible" if over["asked"] is None else f"requested {over['asked']:g}"
     facts = [("times real time", f"{over['factor']:.3g} ({asked})")]
     if over["limit"]:
         facts.append(("limited by", over["limit"]))
@@ -165,31 +165,31 @@ def _has_processes(run: Run) -> bool:
 
 
 def _unfinished(run: Run, mission: Mission, end: float) -> list[str]:
-    """What a reader must know before trusting the numbers."""
+    """Return notes about lost UAVs and an early end, which limit what the numbers mean."""
     notes = [f"UAV {uav} lost at {t:.2f} s: {why}" for uav, (t, why) in run.lost.items()]
     over = any("flight over" in str(event["text"]) for event in run.events)
     step = mission.timing.record_every * mission.timing.period
     if end < mission.timing.duration - 1.5 * step:
-        how = "" if over or not _has_processes(run) else " and was not ended in order: the last seconds may be missing"
+        how = "" if over or not _has_processes(run) else " and did not end normally: the last seconds may be missing"
         notes.append(f"The flight ended at {end:g} s of {mission.timing.duration:g} s{how}.")
     return notes
 
 
 def _figures_note(sheet: Sheet, mission: Mission) -> str:
     if sheet.source and mission.name in sheet.scenarios:
-        return f"As the figures of {sheet.source}, with their quantities and axes. Gray lines: events."
+        return f"Same quantities and axes as the figures of {sheet.source}. Gray lines: events."
     if sheet.source:
-        return f"The quantities of {sheet.source}'s figures, for a scenario of one's own. Gray lines: events."
-    return "What the scheme declares: motion, errors with their bounds, commands with their limits. Gray lines: events."
+        return f"Same quantities as the figures of {sheet.source}, for another scenario. Gray lines: events."
+    return "Signals of the scheme: motion, errors with bounds, commands with limits. Gray lines: events."
 
 
 def _late_section(run: Run) -> list[Section]:
-    """Late ticks by UAV, where there were any."""
+    """Return late ticks by UAV, if there were any."""
     late_by_uav: dict[str, int] = next((event["late_of"] for event in reversed(run.events) if "late_of" in event), {})
     rows = [[Cell(f"UAV {uav}"), Cell(str(late))] for uav, late in late_by_uav.items() if late]
     if not rows:
         return []
-    before = ["Ticks in which a command came too late and the last one was held: the computer was overloaded."]
+    before = ["In these ticks a command arrived too late and the previous one was held: the computer was overloaded."]
     return [Section("late", "Late ticks", before, heads=[Head("UAV"), Head("late ticks", True)], rows=rows)]
 
 

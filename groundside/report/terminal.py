@@ -1,4 +1,4 @@
-"""What a run showed, on the terminal: its verdict, claims and events; verdict and claims as JSON."""
+"""Show a run on the terminal: its verdict, claims and events; return verdict and claims as JSON."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not 
 
 
 def claims_of(run: Run) -> list[Result]:
-    """The claims of a run's scenario, held against what it recorded."""
+    """Evaluate the claims of a run's scenario on its recording."""
     mission = run.mission
     return evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
 def show_verdict(console: Console, verdict: Verdict) -> None:
-    """Print how a flight went: the word, what led to it, and the largest tracking errors."""
+    """Print the verdict of a flight: the word, its reasons, and the largest tracking errors."""
     from rich.markup import escape
 
     lines = [f"[{_COLOURS[verdict.word]}]verdict: {verdict.word}[/]"]
@@ -36,12 +36,12 @@ def show_verdict(console: Console, verdict: Verdict) -> None:
     lines += [f"  [yellow]{escape(text)}[/]" for text in verdict.remarks]
     lines += [f"  [dim]{escape(text)}[/]" for text in verdict.largest]
     for line in lines:
-        # On a terminal between words; whole where it goes into a file.
+        # Wrap lines on a terminal only, not in a file.
         console.print(line, highlight=False, soft_wrap=not console.is_terminal)
 
 
 def as_json(run: Run, results: list[Result]) -> str:
-    """Verdict and claims for programs: ``value`` and ``ok`` are null where the flight did not cover the window."""
+    """Return verdict and claims as JSON; ``value`` and ``ok`` are null if the flight did not cover the window."""
     mission = run.mission
     document = {
         "scenario": mission.name,
@@ -54,7 +54,7 @@ def as_json(run: Run, results: list[Result]) -> str:
 
 
 def number(value: Any) -> str:
-    """A measured or expected value, or several."""
+    """Format one or several measured or expected values."""
     if value is None:
         return "-"
     if isinstance(value, list):
@@ -63,7 +63,7 @@ def number(value: Any) -> str:
 
 
 def summary(results: Sequence[Result]) -> str:
-    """How many claims hold."""
+    """Return how many claims hold, as text."""
     held = sum(result.ok is True for result in results)
     not_flown = sum(result.ok is None for result in results)
     return f"{held} of {len(results)} claims hold" + (f", {not_flown} not flown" if not_flown else "")
@@ -76,7 +76,7 @@ def show_claims(console: Console, results: list[Result]) -> None:
 
 
 def claims_table(results: list[Result]) -> Table:
-    """A table of claims: what was expected, what was measured."""
+    """Return a table of claims with expected and measured values."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -110,7 +110,7 @@ def claims_table(results: list[Result]) -> Table:
 
 
 def show(console: Console, run: Run, results: list[Result]) -> None:
-    """The whole report on the terminal: what was flown, what happened, which claims hold."""
+    """Print the whole report: scenario, events, claims and verdict."""
     from rich.markup import escape
 
     mission = run.mission

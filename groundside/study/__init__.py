@@ -1,4 +1,4 @@
-"""Studies: one scenario flown many times, over values of its settings and seeds of its chance."""
+"""Fly one scenario many times, over values of its settings and random seeds."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""A study as a figure: every claim over the first varied key."""
+"""Draw a study as a figure: every claim over the first varied key."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ __all__ = ["draw"]
 def draw(study: Study, outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
     """Draw every claim over the first varied key, a line per combination of the others, as PNG and PDF.
 
-    Thick: quartiles; thin: smallest to largest; dashed: the claim's bound, dotted: what it expects of its case. A claim
-    of which no flight shows a number is left out; where only some do, it is said how many.
+    Thick: quartiles; thin: smallest to largest; dashed: bound of the claim; dotted: value expected in the scenario's
+    case. Claims without any number are left out; if only some flights have one, their count is shown.
     """
     from ftcc.groundside.canvas import plt
 

@@ -1,6 +1,6 @@
-"""The flights of a study, on all cores: processes that load the compiled law once, then fly trial after trial.
+"""Fly a study on all cores: each process loads the compiled law once, then flies one trial after another.
 
-With one job, or where what such processes share (semaphores, in ``/dev/shm``) cannot be had, all fly in this one.
+With one job, or if the system provides no semaphores (in ``/dev/shm``), all trials fly in this process.
 """
 
 from __future__ import annotations
@@ -37,34 +37,34 @@ _ONE_THREAD = ("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one flight of a study showed."""
+    """Result of one flight of a study."""
 
     trial: Trial
     results: tuple[Result, ...]
-    """The claims of the scenario's case; empty if it did not fly."""
+    """Results of the claims of the scenario's case; empty if it did not fly."""
     lost: dict[int, tuple[float, str]]
-    """When (s) and why UAVs were lost."""
+    """Time (s) and reason of each lost UAV."""
     wall: float
     """Wall time of the flight, s."""
     problem: str
-    """Why there was no flight, or why it broke off; empty if there was one."""
+    """Why the trial did not fly, or not to its end; empty if it did."""
     verdict: Verdict | None = None
     """None if it did not fly."""
 
     @property
     def error(self) -> str:
-        """What went wrong, lost UAVs included; empty if nothing did."""
+        """Return the problem, or the lost UAVs, as text; empty if there are none."""
         lost = [f"UAV {uav} lost at {t:g} s: {why}" for uav, (t, why) in self.lost.items()]
         return "; ".join([self.problem] if self.problem else lost)
 
 
 class _Task(NamedTuple):
-    """What a process that flies trials must know."""
+    """What a process needs to fly trials."""
 
     study: Study
     record_in: Path | None
     stop: Any
-    """An event that ends its flight; None in the process that hears Ctrl-C itself."""
+    """Event that ends a flight; None in the process that handles Ctrl-C itself."""
 
 
 class _StoppedError(Exception):
@@ -72,7 +72,7 @@ class _StoppedError(Exception):
 
 
 def run_folder(folder: Path, trial: Trial) -> Path:
-    """Where a trial is recorded, if it is."""
+    """Return the folder of a trial's recording."""
     return folder / "runs" / f"{trial.number:04d}"
 
 
@@ -89,25 +89,25 @@ def fly_all(
     ----------
     study : Study
     jobs : int
-        Number of processes; 1: this one, which a trial that dies takes with it.
+        Number of processes; 1: only this one, which ends if a trial crashes.
     report : callable
-        Called with every outcome as it comes, in no particular order.
+        Called with each outcome when it is ready, in no particular order.
     record_in : Path, optional
-        The study's folder, where every flight is recorded; by default none is.
+        The study's folder, where every flight is recorded; default: no recordings.
     ready : callable, optional
         Called once when the law is compiled.
 
     Returns
     -------
     bool
-        False if Ctrl-C ended the study before its time.
+        False if Ctrl-C interrupted the study.
     """
     trials = collections.deque(study.trials)
     jobs = min(jobs, len(trials))
     stop = _new_stop_event() if jobs > 1 else None
     try:
         with _catch_ctrl_c() as raise_if_interrupted:
-            # Compiled once here, or by every process at the same time.
+            # Compile once here; otherwise every process would compile at the same time.
             timing = study.mission.timing._replace(ticks=0)
             fly_in_memory(dataclasses.replace(study.mission, timing=timing))
             raise_if_interrupted()
@@ -126,12 +126,12 @@ def fly_all(
 
 
 def _new_stop_event() -> Any:
-    """What stops the processes, made of the semaphores that they share; None, with a warning, where there are none."""
+    """Return an event that stops the processes; None, with a warning, if the system provides no semaphores."""
     try:
         return multiprocessing.get_context("spawn").Event()
     except (OSError, ImportError) as error:
         why = getattr(error, "strerror", None) or error
-        text = f"cannot use several processes ({why}; their semaphores need /dev/shm): all flights run in this one"
+        text = f"no semaphores for several processes ({why}; they are in /dev/shm): all flights use this process"
         warnings.warn(text, RuntimeWarning, stacklevel=3)
         return None
 
@@ -147,7 +147,7 @@ def _fly_here(
         warnings.simplefilter("ignore", PlainPython)
         while trials:
             outcome = _fly_trial(task, trials.popleft())
-            raise_if_interrupted()  # a flight that Ctrl-C has cut short is no outcome
+            raise_if_interrupted()  # discard a flight that Ctrl-C has interrupted
             report(outcome)
 
 
@@ -158,24 +158,24 @@ def _fly_in_pools(
     report: Callable[[Outcome], None],
     raise_if_interrupted: Callable[[], None],
 ) -> None:
-    """Fly the trials in so many processes at a time."""
+    """Fly the trials in ``jobs`` processes."""
     context = multiprocessing.get_context("spawn")
     pool_of = functools.partial(
         ProcessPoolExecutor, mp_context=context, initializer=_initialize_worker, initargs=(task,)
     )
     while trials:
         for trial in _fly_in_pool(pool_of(jobs), trials, jobs, report, raise_if_interrupted):
-            # A process died. Whose fault it was shows when each of those that were in flight flies alone.
+            # A process died. To find the trial that caused it, fly each of the trials in flight alone.
             for dead in _fly_in_pool(pool_of(1), collections.deque([trial]), 1, report, raise_if_interrupted):
                 report(Outcome(dead, (), {}, 0.0, "its process died"))
 
 
 @contextlib.contextmanager
 def _catch_ctrl_c() -> Iterator[Callable[[], None]]:
-    """Gives a function that raises KeyboardInterrupt if one was raised before and went unheard.
+    """Yield a function that raises KeyboardInterrupt if Ctrl-C was pressed before.
 
-    Python drops one that is raised in a destructor, and a flight that is interrupted only ends early. Outside of the
-    main thread there is none to hear.
+    Python drops the exception if it is raised in a destructor, and an interrupted flight only ends early. Outside of
+    the main thread signals cannot be handled.
     """
     came = False
 
@@ -205,7 +205,7 @@ def _fly_in_pool(
     report: Callable[[Outcome], None],
     raise_if_interrupted: Callable[[], None],
 ) -> list[Trial]:
-    """Fly the trials until none is left or a process dies; those that were in flight then."""
+    """Fly the trials until none is left or a process dies; return the trials in flight at that time."""
     flying: dict[Future[Outcome], Trial] = {}
     try:
         while trials or flying:
@@ -226,14 +226,14 @@ def _fly_in_pool(
 
 
 def _submit(pool: ProcessPoolExecutor, trial: Trial) -> Future[Outcome]:
-    """Hand over a trial; a process that is started for it does not import the program that started us."""
+    """Submit a trial; a process started for it does not import the program that started this one."""
     with no_main_module(), _single_threaded(), _block_ctrl_c():
         return pool.submit(_fly_in_worker, trial)
 
 
 @contextlib.contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Processes started meanwhile use one thread each: the flights are what runs in parallel."""
+    """Make processes that are started meanwhile use one thread each, because flights run in parallel."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:
@@ -248,9 +248,9 @@ def _single_threaded() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _block_ctrl_c() -> Iterator[None]:
-    """Processes started meanwhile leave Ctrl-C to this one, from their first instruction on.
+    """Make processes that are started meanwhile leave Ctrl-C to this one, from their first instruction.
 
-    They inherit that SIGINT is blocked. Here it only waits: ignored, one that comes meanwhile would be lost.
+    They inherit that SIGINT is blocked. Here a blocked SIGINT stays pending; an ignored one would be lost.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -259,7 +259,7 @@ def _block_ctrl_c() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-# In the processes.
+# In the worker processes.
 
 _task: _Task
 
@@ -275,7 +275,7 @@ def _fly_in_worker(trial: Trial) -> Outcome:
 
 
 def _fly_trial(task: _Task, trial: Trial) -> Outcome:
-    """Fly one trial; whatever goes wrong with it is its outcome."""
+    """Fly one trial; an error becomes part of its outcome."""
     study, record_in, stop = task
     mission = study.mission_of(trial)
     if mission is None:
@@ -296,7 +296,7 @@ def _fly_trial(task: _Task, trial: Trial) -> Outcome:
         verdict = flight.verdict
     except _StoppedError:
         raise
-    except Exception as error:  # a flight that fails is a row of the table, not the end of the study
+    except Exception as error:  # a failed flight is a row of the table and must not end the study
         where = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
         return Outcome(trial, (), {}, time.perf_counter() - begun, text)

@@ -1,4 +1,4 @@
-"""What a study flies: every combination of the varied values, with every seed; checked before anything starts."""
+"""Plan a study: every combination of the varied values, with every seed, checked before anything starts."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ __all__ = ["Combination", "Study", "StudyError", "Trial", "Variation", "plan_stu
 
 
 class StudyError(UserError):
-    """A study that cannot begin."""
+    """A study that cannot start."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """A key of the scenario and the values that it takes."""
+    """A key of the scenario and its values."""
 
     key: str
     values: tuple[Any, ...]
@@ -35,13 +35,13 @@ class Combination:
     """One value of every variation."""
 
     values: tuple[Any, ...]
-    """In the order of the study's variations."""
+    """Values in the order of the study's variations."""
     mission: Mission | None
-    """With the first seed; None if it cannot fly."""
+    """Mission with the first seed; None if it cannot fly."""
     in_case: bool
-    """Whether this is the scenario's case itself, for which its claims give expected values."""
+    """Whether this is the scenario's own case, for which its claims give expected values."""
     problem: str = ""
-    """Why it cannot fly."""
+    """Why it cannot fly; empty if it can."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Trial:
     """One flight of a study."""
 
     number: int
-    """From 0."""
+    """Number of the flight, from 0."""
     combination: int
     """Index into the study's combinations."""
     seed: int
@@ -57,28 +57,28 @@ class Trial:
 
 @dataclass(frozen=True)
 class Study:
-    """A scenario, and what is varied in it; all is read and checked before the first flight, and then stays."""
+    """A scenario and its variations; everything is read and checked before the first flight."""
 
     settings: tuple[str, ...]
-    """Those of all flights."""
+    """Settings of all flights."""
     variations: tuple[Variation, ...]
     combinations: tuple[Combination, ...]
     seeds: tuple[int, ...]
-    """Of every combination, so that combinations are compared in the same weather."""
+    """Seeds of every combination, so that all combinations are compared under the same disturbances."""
 
     @property
     def trials(self) -> list[Trial]:
-        """All flights, in order."""
+        """Return all flights, in order."""
         pairs = itertools.product(range(len(self.combinations)), self.seeds)
         return [Trial(number, combination, seed) for number, (combination, seed) in enumerate(pairs)]
 
     @property
     def mission(self) -> Mission:
-        """That of the first combination that can fly; what all share is read from it."""
+        """Return the mission of the first combination that can fly, for properties that all share."""
         return next(c.mission for c in self.combinations if c.mission is not None)
 
     def mission_of(self, trial: Trial) -> Mission | None:
-        """The mission of one flight; None if it cannot fly."""
+        """Return the mission of one flight; None if it cannot fly."""
         mission = self.combinations[trial.combination].mission
         return None if mission is None else mission.with_seed(trial.seed)
 
@@ -101,18 +101,18 @@ def plan_study(
     name : str
         A scenario, see `scenario.load`, as are ``form``, ``variants``, ``settings`` and ``duration``.
     vary : sequence of str
-        ``key.path=value,value,...``, values as in TOML; the study flies every combination.
+        ``key.path=value,value,...`` with values as in TOML; the study flies every combination.
     seeds : int
-        Flights of each combination, with seeds that count up from ``seed``.
+        Number of flights of each combination, with consecutive seeds from ``seed``.
     seed : int, optional
-        The first; default: the scenario's.
+        First seed; default: that of the scenario.
 
     Raises
     ------
     StudyError
-        For a ``vary`` that is none, or a study of which no combination can fly.
+        For an invalid ``vary``, or if no combination can fly.
     ScenarioError
-        For a scenario that cannot fly as it stands, or a value that the scenario's format does not allow.
+        If the unchanged scenario cannot fly, or a value is invalid in the format of scenarios.
     """
     if seeds < 1:
         raise StudyError(f"--seeds {seeds}: must be at least 1")
@@ -120,7 +120,7 @@ def plan_study(
     keys = [variation.key for variation in variations]
     for key in keys:
         if keys.count(key) > 1:
-            raise StudyError(f"--vary {key}: is varied twice; give all its values at once")
+            raise StudyError(f"--vary {key}: given twice; give all values in one --vary")
         if key == "seed":
             raise StudyError("--vary seed: every combination flies with every seed; use --seeds and --seed")
     load_variant = functools.partial(load, name, form=form, variants=variants)
@@ -144,9 +144,9 @@ def plan_study(
 
 
 def _conditions_of_case(published: Scenario) -> tuple[Any, ...] | None:
-    """The essence of the case that the claims speak of; None where that does not fly."""
+    """Return the conditions of the scenario's own case, to which its claims refer; None if it cannot fly."""
     if published.plan.flown and published.plan.flown.settings:
-        return None  # a run that was flown with settings of its own
+        return None  # a recorded run with changed settings
     try:
         return _conditions_of(resolve(published))
     except ScenarioError:
@@ -154,7 +154,7 @@ def _conditions_of_case(published: Scenario) -> tuple[Any, ...] | None:
 
 
 def _conditions_of(mission: Mission) -> tuple[Any, ...]:
-    """What makes a flight, but for its length and its chance."""
+    """Return everything that determines a flight, except its duration and seed."""
     timing = mission.timing._replace(ticks=0, seed=0)
     return mission.scheme.name, mission.wire, timing, mission.graph.weights, mission.vehicles, mission.autopilots
 
@@ -180,7 +180,7 @@ def _variation(text: str) -> Variation:
 
 
 def _number_or_text(text: str) -> float | str:
-    """What TOML would not take: numbers such as .1, and words without quotes."""
+    """Read a value that TOML refuses: a number such as .1, or a word without quotes."""
     try:
         return float(text)
     except ValueError:

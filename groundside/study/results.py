@@ -1,4 +1,4 @@
-"""What a study shows: a table with a row per flight, and a summary."""
+"""Tabulate a study: a table with a row per flight, and a summary."""
 
 from __future__ import annotations
 
@@ -24,42 +24,42 @@ if TYPE_CHECKING:
 __all__ = ["SCHEMA_VERSION", "Quantity", "kind_of", "label", "quantities", "summary", "table", "verdict", "write"]
 
 SCHEMA_VERSION = 1
-"""Of ``study.parquet``."""
+"""Version of the columns of ``study.parquet``."""
 
 _VERSIONS = ("ftcc-sitl", "numba", "numpy")
 
 _COLUMNS_OF_SUMMARY = 8
-"""Combinations that a terminal has room for."""
+"""Largest number of combinations on a terminal."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that every flight shows: a claim's value, or that of one UAV where each has its own."""
+    """A number that every flight has: the value of a claim, or of one UAV if each has its own."""
 
     name: str
     title: str
-    """Of its claim."""
+    """Title of its claim."""
     claim: Claim
     place: int
     """Index of the claim."""
     part: int | None
     """Index into the claim's UAVs."""
     expected: float
-    """In the scenario's case."""
+    """Expected value in the scenario's case."""
     tolerance: Tolerance
 
     def of(self, outcome: Outcome) -> float | None:
-        """The number, None if the flight did not show it."""
+        """Return the number of a flight; None if it has none."""
         value = outcome.results[self.place].value if outcome.results else None
         return value[self.part or 0] if isinstance(value, list) else value
 
     def among(self, outcomes: Iterable[Outcome]) -> list[float]:
-        """The numbers of those flights that show one."""
+        """Return the numbers of all flights that have one."""
         return [value for value in map(self.of, outcomes) if value is not None]
 
 
 def quantities(study: Study) -> list[Quantity]:
-    """What the claims of the study's case measure, in their order."""
+    """Return the quantities that the claims of the study's case measure, in their order."""
     mission = study.mission
     found: list[Quantity] = []
     for place, claim in enumerate(mission.claims):
@@ -77,11 +77,11 @@ def quantities(study: Study) -> list[Quantity]:
 
 
 def verdict(result: Result, in_case: bool) -> bool | None:
-    """Whether a claim holds, None where that cannot be said.
+    """Return whether a claim holds; None if the claim does not apply.
 
-    A band around an expected number speaks of the scenario's case alone: with other settings the number is a result
-    and no failure. A bound is a demand, which any flight can be held to; and a claim fails wherever its UAV was lost or
-    what it times never came about.
+    A band around an expected number applies only to the scenario's case; with other settings the number is a result,
+    not a failure. A bound applies to every flight. A claim also fails if its UAV was lost, or if the event that it
+    times did not occur.
     """
     if in_case or tolerance_of(result.tolerance).bound or (result.ok is False and result.value is None):
         return result.ok
@@ -89,12 +89,12 @@ def verdict(result: Result, in_case: bool) -> bool | None:
 
 
 def table(study: Study, outcomes: Sequence[Outcome]) -> Any:
-    """All flights as a ``pyarrow.Table``, a row each.
+    """Return all flights as a ``pyarrow.Table``, one row per flight.
 
     Columns: ``flight``, the varied keys, ``seed``; for each claim its value under the claim's name, and ``NAME holds``;
     ``largest error`` (of the scheme's first tracking error), ``verdict``, ``lost`` (ids), ``error`` (text), ``wall``
-    (s). Null: not flown, or no such number. Units, tolerances and sources
-    are in the columns' metadata, the rest in the table's.
+    (s). Null: not flown, or no such number. Units, tolerances and sources are in the columns' metadata, the rest in the
+    table's.
     """
     import pyarrow as pa
 
@@ -155,7 +155,7 @@ def _notes(quantity: Quantity) -> dict[str, str]:
 
 
 def kind_of(values: Sequence[Any]) -> tuple[Any, Any]:
-    """Arrow type of a varied key, and what makes its values that: numbers and truth stay what they are."""
+    """Return the Arrow type of a varied key, and the function that converts its values to it."""
     import pyarrow as pa
 
     if all(isinstance(value, bool) for value in values):
@@ -166,7 +166,7 @@ def kind_of(values: Sequence[Any]) -> tuple[Any, Any]:
 
 
 def write(study: Study, outcomes: Sequence[Outcome], folder: Path) -> Path:
-    """Write ``study.parquet`` into ``folder``; it appears when it is complete."""
+    """Write ``study.parquet`` into ``folder``, where it appears once it is complete, and return its path."""
     import pyarrow.parquet as pq
 
     path = folder / "study.parquet"
@@ -177,14 +177,14 @@ def write(study: Study, outcomes: Sequence[Outcome], folder: Path) -> Path:
 
 
 def label(study: Study, combination: int, skip: int = 0) -> str:
-    """The values of a combination, but for the first ``skip`` keys, as text."""
+    """Return the values of a combination as text, without the first ``skip`` keys."""
     values = study.combinations[combination].values
     pairs = list(zip(study.variations, values, strict=True))[skip:]
     return ", ".join(f"{v.key} = {value:g}" if isinstance(value, float) else f"{v.key} = {value}" for v, value in pairs)
 
 
 def summary(study: Study, outcomes: Sequence[Outcome]) -> Table:
-    """Medians and quartiles of every claim, a column per combination, for the terminal."""
+    """Return medians and quartiles of every claim, a column per combination, for the terminal."""
     from rich.markup import escape
     from rich.table import Table
 

@@ -130,7 +130,7 @@ def test_a_run_that_was_killed_half_way_is_reported_as_far_as_it_goes(copied: Ca
     shutil.copy(run.path / "signals.parquet", folder / "signals.parquet")
     (folder / "logs").mkdir()
     page = words(write_report(Run(folder)))
-    assert "The flight ended at 30 s of 120 s and was not ended in order" in page
+    assert "The flight ended at 30 s of 120 s and did not end normally" in page
     assert "2 of 8 claims hold, 6 not flown" in page
     assert "late ticks not known" in page
 
@@ -141,7 +141,7 @@ def test_a_run_that_recorded_nothing_says_so(copied: Callable[..., Path]) -> Non
     assert "nothing was recorded" in page
     assert "0 of 8 claims hold, 8 not flown" in page
     assert "elevator fault" in page
-    assert "Nothing was recorded of the links" in page
+    assert "The run recorded no links" in page
 
 
 def test_a_damaged_recording_is_named(copied: Callable[..., Path]) -> None:

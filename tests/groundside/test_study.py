@@ -76,7 +76,7 @@ def flown(scenario: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any
         (["channel.loss="], "--vary channel.loss=: must be key.path=value"),
         (["channel.loss=0,,0.3"], "a value is missing between two commas"),
         (["channel.loss=0.1,.1"], "a value is listed twice"),
-        (["channel.loss=0", "channel.loss=0.3"], "--vary channel.loss: is varied twice"),
+        (["channel.loss=0", "channel.loss=0.3"], "--vary channel.loss: given twice"),
         (["seed=1,2"], "use --seeds"),
         (["channel.los=0,0.3"], "channel.los = 0: there is no such field here; allowed are loss"),
         (["channel.loss=0,1.5"], "channel.loss = 1.5: must be less than or equal to 1"),
