@@ -245,7 +245,7 @@ def run_anew(command: list[str], folder: Path) -> None:
 def dashboard(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
     """What the ground process pays for a picture of eight UAVs, ten of which it draws in a second of wall time."""
     from ftcc.groundside.dashboard import Dashboard
-    from tests.groundside.synthetic_swarm import SUBJECT, flight
+    from tests.groundside.dashboard.synthetic_swarm import SUBJECT, flight
 
     pictures = list(flight(30.0))
     rows = []

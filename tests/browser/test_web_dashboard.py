@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ftcc.groundside.dashboard import Dashboard
-from tests.groundside.synthetic_swarm import SUBJECT, flight
+from tests.groundside.dashboard.synthetic_swarm import SUBJECT, flight
 
 pytestmark = [
     pytest.mark.browser,

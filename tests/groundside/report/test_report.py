@@ -26,7 +26,7 @@ from ftcc.groundside.scenario.loading import forms_and_variants, load, read, shi
 from ftcc.groundside.scenario.mission import Mission, resolve
 from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
 
-SHEETS = sorted((Path(__file__).parents[2] / "groundside" / "report" / "figures").glob("*.toml"))
+SHEETS = sorted((Path(__file__).parents[3] / "groundside" / "report" / "figures").glob("*.toml"))
 
 
 @pytest.fixture(scope="module")

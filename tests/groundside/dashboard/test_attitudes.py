@@ -12,7 +12,7 @@ import pytest
 from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.snapshot import Snapshot
-from tests.groundside.synthetic_swarm import SUBJECT, snapshot
+from tests.groundside.dashboard.synthetic_swarm import SUBJECT, snapshot
 
 BANK, WANTED = 0.5, 0.2
 VIEW = Attitudes(replace(SUBJECT, family="attitude"), Detail(SUBJECT))

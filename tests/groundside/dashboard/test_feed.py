@@ -15,7 +15,7 @@ import pytest
 from ftcc.groundside.dashboard import feed as feed_module
 from ftcc.groundside.dashboard.feed import Feed, decode, encode, feed_path, watch_swarm
 from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot
-from tests.groundside.synthetic_swarm import HAPPENINGS, flight, snapshot
+from tests.groundside.dashboard.synthetic_swarm import EVENTS, flight, snapshot
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def stuck(name: str) -> socket.socket:
 
 
 def test_a_snapshot_arrives_as_it_was_sent() -> None:
-    sent = snapshot(21.0, HAPPENINGS)
+    sent = snapshot(21.0, EVENTS)
     assert decode(encode(sent)) == sent
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ftcc.groundside.dashboard.snapshot import Event, LinkState, Pace, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.link.graph import Graph
-from tests.groundside.synthetic_swarm import SUBJECT
+from tests.groundside.dashboard.synthetic_swarm import SUBJECT
 
 BROKEN = {0.2: (17, 0.6), 0.5: (58, 0.3), 0.8: (83, 0.8)}
 """Faults: share of the flight at which it comes, UAV and remaining effectiveness of its elevator."""
@@ -118,7 +118,7 @@ def snapshot(n: int, t: float, duration: float = 60.0, abreast: bool = False) ->
 
 
 def flight(n: int, duration: float = 60.0, rate: float = 10.0, abreast: bool = False) -> Iterator[Snapshot]:
-    """Snapshots from 0 to ``duration``, with what happened."""
+    """Snapshots from 0 to ``duration``, with their events."""
     events = [Event(0.0, "info", "engaged")]
     events += [Event(at * duration, "error", f"elevator at {100 * left:.0f} %", u) for at, (u, left) in BROKEN.items()]
     for k in range(round(duration * rate) + 1):

@@ -73,16 +73,16 @@ def snapshot(t: float, events: tuple[Event, ...] = ()) -> Snapshot:
 
 
 def flight(duration: float, rate: float = 10.0) -> Iterator[Snapshot]:
-    """Snapshots from 0 to ``duration``, with what happened."""
-    told: set[Event] = set()
+    """Snapshots from 0 to ``duration``, with their events."""
+    sent: set[Event] = set()
     for k in range(round(duration * rate) + 1):
         t = k / rate
-        new = tuple(event for event in HAPPENINGS if event.t <= t and event not in told)
-        told.update(new)
+        new = tuple(event for event in EVENTS if event.t <= t and event not in sent)
+        sent.update(new)
         yield snapshot(t, new)
 
 
-HAPPENINGS = (
+EVENTS = (
     Event(0.0, "info", "engaged"),
     Event(CUT[0], "warning", "link 4 -> 3 cut", 3),
     Event(FAULT_AT, "error", "elevator fault: effectiveness 70 %, bias +0.35 rad", 1),

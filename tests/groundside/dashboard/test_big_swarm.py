@@ -17,7 +17,7 @@ from ftcc.groundside.dashboard.shapes import Poses, sticks
 from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 from ftcc.groundside.dashboard.viewer import Entry
 from ftcc.groundside.palette import CUT
-from tests.groundside.synthetic_crowd import BROKEN, DEAF, SILENT, flight, graph, snapshot, subject
+from tests.groundside.dashboard.synthetic_crowd import BROKEN, DEAF, SILENT, flight, graph, snapshot, subject
 
 DURATION = 60.0
 Flown = tuple[Artists, dict[str, list[Any]]]
