@@ -1,4 +1,4 @@
-"""What a run showed: on the terminal, as JSON, and as a page with figures."""
+"""Report a run: on the terminal, as JSON, and as a page with figures."""
 
 import lazy_loader
 

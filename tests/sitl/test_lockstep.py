@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ftcc.groundside.dashboard.feed import feed_path, watched
+from ftcc.groundside.dashboard.feed import feed_path, watch_swarm
 from tests.bench.swarms import swarm_file
 from tests.sitl.conftest import Flight, events, same_flight
 
@@ -60,7 +60,7 @@ def test_who_watches_changes_nothing(
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as idle:
         idle.connect(str(feed_path(flight.folder.name)))
         assert ftcc("resume").returncode == 0
-        seen = [snapshot.t for snapshot, _ in zip(watched(flight.folder.name), range(5), strict=False)]
+        seen = [snapshot.t for snapshot, _ in zip(watch_swarm(flight.folder.name), range(5), strict=False)]
         assert flight.wait() == 0, flight.output
     assert seen == sorted(seen)
     assert len(seen) == 5

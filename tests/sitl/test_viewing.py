@@ -17,7 +17,7 @@ import pytest
 from ftcc.groundside import Run, Station
 from ftcc.groundside.cli.view import show_past
 from ftcc.groundside.dashboard import Dashboard
-from ftcc.groundside.dashboard.feed import watched
+from ftcc.groundside.dashboard.feed import watch_swarm
 from ftcc.groundside.dashboard.snapshot import Event, Snapshot
 from ftcc.groundside.dashboard.viewer import viewer_program
 from tests import rrd
@@ -128,7 +128,7 @@ def test_a_command_from_the_ground_is_seen_at_once(
     arrived: list[tuple[float, str]] = []
 
     def watch() -> None:
-        for snapshot in watched(flight.folder.name):
+        for snapshot in watch_swarm(flight.folder.name):
             arrived.extend((time.monotonic(), event.text) for event in snapshot.events)
 
     watcher = threading.Thread(target=watch, daemon=True)

@@ -1,4 +1,4 @@
-"""A swarm of a hundred UAVs, or as many as wanted, that only looks like one: for what big swarms cost and look like."""
+"""A synthetic swarm of any number of UAVs, to test the cost and the drawing of big swarms."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _STALL = (Pace(5.2, 10.0, "both cores busy, autopilots 61 %", "try --pack auto")
 
 @functools.cache
 def graph(n: int, leaders: int = 4) -> Graph:
-    """Followers in a ring, each beside its two neighbours on either side; leaders heard at four places."""
+    """Followers in a ring, each beside its two neighbours on either side; each leader is received at two places."""
     followers = tuple(range(1, n - leaders + 1))
     k = len(followers)
     weights = {

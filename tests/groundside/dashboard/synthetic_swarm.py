@@ -1,4 +1,4 @@
-"""A swarm that only looks like one: smooth curves in the shape of a containment flight, for tests of what is drawn."""
+"""A synthetic swarm: smooth curves in the shape of a containment flight, for tests of what is drawn."""
 
 from __future__ import annotations
 

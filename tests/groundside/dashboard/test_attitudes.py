@@ -61,7 +61,7 @@ def test_every_aircraft_is_seen_in_its_bank_from_behind(course: float) -> None:
     assert not any(path.startswith("/attitudes/reference") for path in drawn), "there is none"
 
 
-def test_its_reference_lies_as_the_law_wants_it() -> None:
+def test_an_outline_has_the_reference_attitude() -> None:
     drawn = {entry.path: entry.what for entry in VIEW.draw(banked(0.3, mu_d=WANTED, alpha_d=0.0, beta_d=0.0))}
     for uav in SUBJECT.graph.uavs:
         assert slope_on_the_screen(uav, drawn[f"/attitudes/reference/{uav}"]) == pytest.approx(WANTED, rel=0.3)

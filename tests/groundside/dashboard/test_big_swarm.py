@@ -22,11 +22,11 @@ from tests.groundside.dashboard.synthetic_crowd import BROKEN, DEAF, SILENT, fli
 DURATION = 60.0
 Flown = tuple[Artists, dict[str, list[Any]]]
 ORDINARY = 80
-"""A UAV that nothing happens to."""
+"""A UAV without faults or silence."""
 
 
 def drawn(n: int, family: Any = "containment") -> list[Entry]:
-    """A picture in the middle of a flight in which nothing happens."""
+    """A snapshot in the middle of an uneventful flight."""
     artists = Artists(dataclasses.replace(subject(n), family=family), snapshot(n, 2.0))
     artists.draw(snapshot(n, 2.0))
     return artists.draw(snapshot(n, 3.0))
@@ -38,7 +38,7 @@ def values(what: Any, name: str) -> Any:
 
 @pytest.fixture(scope="module")
 def flown() -> Flown:
-    """A whole flight of a hundred: who drew it, and all that was drawn, by entity."""
+    """A flight of a hundred UAVs: its artists, and all entries by entity."""
     artists: Artists | None = None
     entries: list[Entry] = []
     for snap in flight(100, DURATION, rate=2.0):
@@ -60,7 +60,7 @@ def test_a_picture_takes_as_many_calls_whatever_the_size_of_the_swarm(family: st
     assert counts[150] <= len(drawn(FULL, family))
 
 
-def test_up_to_a_number_everybody_is_drawn_in_full() -> None:
+def test_a_small_swarm_is_drawn_in_full() -> None:
     crew = subject(FULL)
     detail = Detail(crew)
     assert not detail.crowded
@@ -81,7 +81,7 @@ def test_all_others_are_drawn_where_they_are() -> None:
     np.testing.assert_allclose(wings, [(state["y"], state["x"], state["z"]) for state in true], atol=0.01)
 
 
-def test_a_stick_lies_in_the_air_as_the_aircraft_does() -> None:
+def test_a_stick_has_the_attitude_of_its_aircraft() -> None:
     truth = {"chi": 0.4, "gamma": 0.1, "mu": -0.3, "alpha": 0.05, "beta": 0.02}
     place = np.array([10.0, 20.0, 30.0])
     x, y, z, w = values(Poses().of(place, truth), "quaternion")[0]
@@ -152,7 +152,7 @@ def test_edges_without_news_are_drawn_among_the_aircraft(
     assert len([note for note in notes if note.startswith("cut")]) == 1, "one to a receiver"
 
 
-def test_the_table_tells_of_those_in_trouble_first(flown: Flown) -> None:
+def test_the_table_lists_uavs_in_trouble_first(flown: Flown) -> None:
     _, entries = flown
     lines = values(entries["/swarm"][-1], "text")[0].splitlines()
     assert lines[0] == "10 x real time"
@@ -202,9 +202,9 @@ def test_the_frame_leaves_out_who_has_been_left_behind(
 
 
 @pytest.mark.parametrize("leaders", [1, 8, 30])
-def test_leaders_have_places_of_their_own_in_the_plan(leaders: int) -> None:
-    crew = dataclasses.replace(subject(100), graph=graph(100, leaders))
-    plan = Links(crew, Detail(crew))._plan
-    places = [plan[uav] for uav in crew.leaders]
+def test_leaders_have_separate_positions_in_the_graph(leaders: int) -> None:
+    swarm = dataclasses.replace(subject(100), graph=graph(100, leaders))
+    layout = Links(swarm, Detail(swarm))._layout
+    places = [layout[uav] for uav in swarm.leaders]
     apart = [math.dist(a, b) for i, a in enumerate(places) for b in places[:i]]
     assert min(apart, default=1.0) > 0.05

@@ -1,4 +1,4 @@
-"""Watching a swarm: what the station offers arrives whole, and nobody who watches can hold it back."""
+"""Watching a swarm: snapshots arrive complete, and no watcher delays the station."""
 
 from __future__ import annotations
 

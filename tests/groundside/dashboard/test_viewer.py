@@ -106,7 +106,7 @@ def watched(tmp_path: Path) -> Iterator[tuple[Dashboard, int, Path]]:
 
 
 @pytest.mark.parametrize("harm", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_viewer_that_dies_or_hangs_costs_the_swarm_nothing(watched: tuple[Dashboard, int, Path], harm: int) -> None:
+def test_a_viewer_that_dies_or_hangs_does_not_delay_the_swarm(watched: tuple[Dashboard, int, Path], harm: int) -> None:
     dashboard, viewer, path = watched
     problems = []
     longest = 0.0

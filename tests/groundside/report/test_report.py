@@ -49,7 +49,7 @@ def copied(demo_run: Run, tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def few_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pages with one figure, where figures are not what is looked at."""
+    """Reports with one figure, for tests that are not about figures."""
 
     def first(mission: Mission) -> Sheet:
         sheet = sheet_of(mission)
@@ -74,7 +74,7 @@ def test_the_page_needs_nothing_but_itself(report: Path) -> None:
     assert "@media print" in html
 
 
-def test_the_page_tells_claims_events_links_versions_and_seed(report: Path, demo_run: Run) -> None:
+def test_the_page_has_claims_events_links_versions_and_seed(report: Path, demo_run: Run) -> None:
     text = words(report)
     assert "verdict as it should be" in text
     assert "altitude off its place between the leaders, z - z_d" in text
@@ -136,7 +136,7 @@ def test_a_run_that_was_killed_half_way_is_reported_as_far_as_it_goes(copied: Ca
 
 
 @pytest.mark.usefixtures("few_figures")
-def test_a_run_that_recorded_nothing_says_so(copied: Callable[..., Path]) -> None:
+def test_the_report_of_an_empty_recording_says_so(copied: Callable[..., Path]) -> None:
     page = words(write_report(Run(copied("signals.parquet", "links.parquet"))))
     assert "nothing was recorded" in page
     assert "0 of 8 claims hold, 8 not flown" in page
@@ -212,7 +212,7 @@ def test_readings_tell_what_agrees_and_by_how_much_others_differ() -> None:
     mission = resolve(load("containment", form="flight", duration=2.0))
     flight = Flown("flight", fly_in_memory(mission), mission)
     base = {"what": "airspeed", "y": "V", "unit": "m/s", "window": (0.0, 2.0)}
-    told = [
+    readings = [
         base | {"monograph": (29.9, 30.1), "kind": "within"},
         base | {"monograph": (30.5, 31.0), "kind": "within"},
         base | {"y": "V * 0 + 3", "monograph": (2.0, 3.0), "kind": "extremes"},
@@ -221,7 +221,7 @@ def test_readings_tell_what_agrees_and_by_how_much_others_differ() -> None:
     ]
     sheet = sheet_of(mission)
     figure = sheet.figures[0].model_validate(
-        {"name": "x", "title": "X", "panels": [{"y": "V", "label": "V"}], "readings": told}
+        {"name": "x", "title": "X", "panels": [{"y": "V", "label": "V"}], "readings": readings}
     )
     one, two, three, four, five = compare(sheet.model_copy(update={"figures": [figure]}), flight)
     assert (one.agrees, one.difference) == (True, "")
@@ -271,7 +271,7 @@ def test_runs_are_compared_by_case_claim_by_claim(tmp_path: Path) -> None:
     assert (tmp_path / "compared" / "altitude.pdf").exists()
 
 
-def test_runs_of_one_case_are_told_apart_by_their_folders(demo_run: Run) -> None:
+def test_runs_of_one_case_are_distinguished_by_their_folders(demo_run: Run) -> None:
     assert len(set(labels_of([demo_run, Run(demo_run.path)]))) == 1  # the very same folder
     assert demo_run.path.name in labels_of([demo_run, Run(demo_run.path)])[0]
 

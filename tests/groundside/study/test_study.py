@@ -137,7 +137,7 @@ def test_only_bounds_are_judged_where_the_settings_are_not_those_of_the_case(flo
     assert {(row["channel.loss"], row["hull holds"]) for row in rows} == {(0.0, False), (0.3, False)}
 
 
-def test_an_aircraft_that_is_lost_is_told_and_fails_its_claims(scenario: Path) -> None:
+def test_a_lost_aircraft_is_reported_and_fails_its_claims(scenario: Path) -> None:
     settings = ["start.uav.1.gamma=0.5", "plant.guards.flight_path_angle=0.501"]
     study = plan_study(scenario, settings=settings, duration=SECONDS)
     outcomes: list[Outcome] = []

@@ -31,11 +31,11 @@ def test_a_speed_that_is_only_just_held_is_called_tight():
 
 
 def test_a_speed_that_is_out_of_reach_comes_with_the_limit_and_advice():
-    said = judge_prediction("demo", flown(LIMITED), speed=10.0).verdict
-    assert said == "too slow for --speed 10: all 2 cores are busy, most with autopilots: 1.2; --pack auto"
+    found = judge_prediction("demo", flown(LIMITED), speed=10.0).verdict
+    assert found == "too slow for --speed 10: all 2 cores are busy, most with autopilots: 1.2; --pack auto"
 
 
-def test_who_wants_whatever_can_be_had_hears_the_limit():
+def test_at_unlimited_speed_the_verdict_is_the_limit():
     assert judge_prediction("demo", flown(LIMITED), speed=math.inf).verdict == f"{LIMITED.limit}; {LIMITED.advice}"
 
 

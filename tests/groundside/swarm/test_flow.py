@@ -1,4 +1,4 @@
-"""The flow of simulated time: everybody is held before one tick, whatever each was doing."""
+"""The flow of simulated time: all processes are held before the same tick."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Swarm:
 
     def __init__(self, *ticks: int, lockstep: bool = False, held: bool = False) -> None:
         self.ticks = {f"vehicle {n}": tick for n, tick in enumerate(ticks)}
-        self.said: list[Any] = []
-        self.flow = Flow(0.01, 1.0, lockstep, held, self.said.append, lambda: list(self.ticks))
+        self.sent: list[Any] = []
+        self.flow = Flow(0.01, 1.0, lockstep, held, self.sent.append, lambda: list(self.ticks))
 
     def obey(self) -> None:
-        """Fly as far as the limits allow and report, until nothing more is said."""
-        while limits := [message for message in self.said if isinstance(message, Limit)]:
-            self.said.clear()
+        """Fly as far as the limits allow and report, until no more messages are sent."""
+        while limits := [message for message in self.sent if isinstance(message, Limit)]:
+            self.sent.clear()
             limit = limits[-1].tick
             assert limit is not None
             for name in self.ticks:
@@ -30,7 +30,7 @@ class Swarm:
                 self.flow.mark_held(name, self.ticks[name])
 
 
-def test_a_pause_brings_everybody_to_the_tick_of_the_foremost():
+def test_a_pause_brings_all_processes_to_the_latest_tick():
     swarm = Swarm(100, 103, 101)
     swarm.flow.pause()
     swarm.obey()
@@ -61,7 +61,7 @@ def test_resume_goes_on_from_the_tick_at_which_it_was_held():
     swarm.flow.pause()
     swarm.obey()
     swarm.flow.resume()
-    pace, limit = swarm.said
+    pace, limit = swarm.sent
     assert (pace.tick, limit) == (103, Limit(None))
     assert swarm.flow.state == "flying"
 
@@ -76,20 +76,20 @@ def test_another_speed_begins_at_a_tick_that_is_the_same_for_all_and_not_past():
     swarm = Swarm(0)
     pace, _ = swarm.flow.begin()
     swarm.flow.set_speed(4.0)
-    (new,) = swarm.said
+    (new,) = swarm.sent
     assert isinstance(new, Pace)
     assert new.speed == 4.0
     assert new.wall == pytest.approx(pace.wall + (new.tick - pace.tick) * 0.01)
 
 
 def test_in_lockstep_another_speed_begins_wherever_each_process_is():
-    """Nobody knows how far a swarm has come that its computer may hold back."""
+    """The current tick of a swarm on a slow computer is unknown."""
     swarm = Swarm(0, lockstep=True)
     swarm.flow.begin()
     for speed in (4.0, math.inf, 0.5):
-        swarm.said.clear()
+        swarm.sent.clear()
         swarm.flow.set_speed(speed)
-        (pace,) = swarm.said
+        (pace,) = swarm.sent
         assert (pace.tick, pace.speed) == (None, speed)
 
 

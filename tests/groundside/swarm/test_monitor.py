@@ -46,15 +46,15 @@ def pilot() -> Iterator[socket.socket]:
 
 @pytest.fixture
 def station(pilot: socket.socket, tmp_path: Path) -> Iterator[Monitor]:
-    """Hears UAVs 1 and 2 as systems 101 and 102."""
+    """Receive UAVs 1 and 2 as systems 101 and 102."""
     made = Monitor(0, {pilot.getsockname()[1]}, (1, 2), PLANT, SIGNALS, tmp_path / "telemetry.tlog", id_offset=100)
-    pilot.connect(made._ear._socket.getsockname())
+    pilot.connect(made._socket._socket.getsockname())
     yield made
     made.close()
 
 
 def as_pymavlink_reads(datagram: bytes) -> list[Telemetry]:
-    told = []
+    messages = []
     for message in Codec(254, 1).parse(datagram):
         read = Telemetry(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
         if read.kind == HEARTBEAT:
@@ -65,8 +65,8 @@ def as_pymavlink_reads(datagram: bytes) -> list[Telemetry]:
             read = read._replace(stamp_us=message.time_boot_ms * 1000)
         if hasattr(message, "time_usec"):
             read = read._replace(stamp_us=message.time_usec)
-        told.append(read)
-    return told
+        messages.append(read)
+    return messages
 
 
 def some_message(draw: random.Random) -> Any:
@@ -111,7 +111,7 @@ def damaged(datagram: bytes, draw: random.Random) -> bytes:
     return bytes(octets)
 
 
-def test_whatever_comes_is_read_as_pymavlink_reads_it(receiver: TelemetrySocket) -> None:
+def test_every_message_is_parsed_as_pymavlink_parses_it(receiver: TelemetrySocket) -> None:
     draw = random.Random(5)
     codecs = [Codec(system, 1) for system in (1, 7, 200)]
     for _ in range(3000):
@@ -129,7 +129,7 @@ def test_a_value_that_is_not_finite_is_refused_and_its_neighbours_are_taken(
     bad[30:34] = struct.pack("<f", value)  # the first number of the first message
     end = 10 + bad[1]
     bad[end : end + 2] = struct.pack("<H", dialect.x25crc(bytes(bad[1:end]) + b"\xe8").crc)
-    assert [told.name for told in receiver.parse(bytes(bad))] == ["signals"]
+    assert [message.name for message in receiver.parse(bytes(bad))] == ["signals"]
     assert receiver.parse(bytes(bad)) == as_pymavlink_reads(bytes(bad))
 
 
@@ -142,9 +142,7 @@ def test_signed_and_old_messages_are_read_as_ever(receiver: TelemetrySocket, tmp
         assert receiver.parse(datagram) == as_pymavlink_reads(datagram)
 
 
-def test_what_comes_again_and_again_does_not_need_pymavlink(
-    receiver: TelemetrySocket, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_frequent_messages_do_not_need_pymavlink(receiver: TelemetrySocket, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(receiver._codec, "parse", lambda _: pytest.fail("parsed"))
     state = [0.1] * 6
     datagram = Codec(5, 1).pack(
@@ -159,7 +157,7 @@ def test_what_comes_again_and_again_does_not_need_pymavlink(
         dialect.MAVLink_vfr_hud_message(30.0, 30.0, 90, 50, 1000.0, 0.0),
         dialect.MAVLink_servo_output_raw_message(1000, 0, 1500, 1500, 1500, 1200, 0, 0, 0, 0),
     )
-    assert [told.system for told in receiver.parse(datagram)] == [5] * 10
+    assert [message.system for message in receiver.parse(datagram)] == [5] * 10
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
@@ -169,7 +167,7 @@ def test_a_display_that_is_not_finite_is_refused(receiver: TelemetrySocket, valu
     assert receiver.parse(datagram) == as_pymavlink_reads(datagram) == []
 
 
-def test_the_swarm_as_it_was_told(station: Monitor, pilot: socket.socket) -> None:
+def test_a_snapshot_holds_the_telemetry(station: Monitor, pilot: socket.socket) -> None:
     true = {name: float(i) for i, name in enumerate(NAMES)}
     pilot.send(Codec(101, 25).pack(float_array(2_500_000, "truth", list(true.values()))))
     assert not station.complete
@@ -186,12 +184,12 @@ def test_the_swarm_as_it_was_told(station: Monitor, pilot: socket.socket) -> Non
     station.read()
     assert station.complete
     assert station.t == 2.5
-    heard = station.snapshot().uavs
+    uavs = station.snapshot().uavs
     plant = find(PLANT)
-    assert heard[2].t == 2.4
-    assert heard[2].signals == {}
-    assert heard[2].links == {}
-    one = heard[1]
+    assert uavs[2].t == 2.4
+    assert uavs[2].signals == {}
+    assert uavs[2].links == {}
+    one = uavs[1]
     assert dict(one.truth) == {name: true[name] for name in TRUTH}
     assert dict(one.command) == {name: true[f"{name}_command"] for name in plant.ACTUATORS}
     assert dict(one.acting) == {name: true[name] for name in plant.ACTUATORS}
@@ -225,9 +223,9 @@ def test_the_log_holds_the_messages_as_they_came(station: Monitor, pilot: socket
 def test_the_log_is_stamped_with_simulated_time_that_never_goes_back(pilot: socket.socket, tmp_path: Path) -> None:
     log = tmp_path / "stamped.tlog"
     station = Monitor(0, {pilot.getsockname()[1]}, (1, 2), PLANT, SIGNALS, log, started=1.8e9)
-    pilot.connect(station._ear._socket.getsockname())
+    pilot.connect(station._socket._socket.getsockname())
     state = [0.1] * 6
-    # The second to last has been told a tick earlier, the last is beyond every flight.
+    # The second to last is of an earlier tick, the last is beyond every flight.
     for ms in (0, 40, 1000, 990, 2**32 - 1):
         heartbeat = dialect.MAVLink_heartbeat_message(1, 12, 129, custom_mode(MISSION), 4, 3)
         pilot.send(Codec(1, 1).pack(heartbeat, dialect.MAVLink_attitude_message(ms, *state)))
@@ -240,10 +238,10 @@ def test_the_log_is_stamped_with_simulated_time_that_never_goes_back(pilot: sock
     assert stamps == pytest.approx([0.0, 0.0, 0.04, 0.04, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], abs=1e-5)
 
 
-def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
+def test_datagrams_from_other_ports_are_dropped(station: Monitor, tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.sendto(
-            Codec(101, 25).pack(float_array(9, "truth", [1.0] * len(NAMES))), station._ear._socket.getsockname()
+            Codec(101, 25).pack(float_array(9, "truth", [1.0] * len(NAMES))), station._socket._socket.getsockname()
         )
         station.read()
     assert station.foreign_datagrams == 1
@@ -252,11 +250,11 @@ def test_strangers_are_not_believed(station: Monitor, tmp_path: Path) -> None:
     assert (tmp_path / "telemetry.tlog").read_bytes() == b""
 
 
-def test_on_a_full_disk_the_log_ends_and_the_station_hears_on(pilot: socket.socket, tmp_path: Path) -> None:
+def test_on_a_full_disk_the_log_ends_and_the_station_goes_on(pilot: socket.socket, tmp_path: Path) -> None:
     log = tmp_path / "telemetry.tlog"
     log.symlink_to("/dev/full")
     station = Monitor(0, {pilot.getsockname()[1]}, (1,), PLANT, SIGNALS, log)
-    pilot.connect(station._ear._socket.getsockname())
+    pilot.connect(station._socket._socket.getsockname())
     codec = Codec(1, 1)
     for n in range(200):
         pilot.send(codec.pack(float_array(10_000 * n, "truth", [1.0] * len(NAMES))))

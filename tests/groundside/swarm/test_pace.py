@@ -73,7 +73,7 @@ def test_where_nothing_is_left_to_change_the_machine_is_too_small():
     assert full.advice == "fewer UAVs, or more cores"
 
 
-def test_other_programs_are_told_from_the_swarm():
+def test_other_programs_are_distinguished_from_the_swarm():
     crowded = pace(3.0, swarm(8, 0.02, 0.08, pack=8), setup(asked=1.0, pack=8), others=1.9)
     assert crowded.limit == "all 2 cores are busy, other programs take 1.9"
     assert "fewer other programs" in crowded.advice
@@ -92,7 +92,7 @@ def test_a_vehicle_and_an_autopilot_process_that_take_turns_are_one_core():
     assert "--pack 50" in turns.advice
 
 
-def test_two_busy_processes_on_two_cores_are_not_told_to_be_more():
+def test_no_more_processes_are_advised_for_two_busy_ones_on_two_cores():
     pair = pace(500.0, swarm(8, 0.7, 0.71, pack=8), setup(pack=8))
     assert pair.limit == "processes wait for each other's messages: the swarm uses 1.4 of 2 cores"
     assert pair.advice == ""

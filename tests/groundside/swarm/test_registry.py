@@ -1,4 +1,4 @@
-"""The socket by which a swarm is told what to do: whatever comes, the swarm flies on and the caller is answered."""
+"""The control socket of a swarm: every client gets an answer, and no request ends the flight."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def control(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Control
         yield one
 
 
-def said(control: ControlSocket, line: bytes) -> dict[str, Any]:
+def answer_to(control: ControlSocket, line: bytes) -> dict[str, Any]:
     """What the swarm answers to a line."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.settimeout(5.0)
@@ -63,10 +63,10 @@ def said(control: ControlSocket, line: bytes) -> dict[str, Any]:
     ],
 )
 def test_nonsense_is_refused_and_the_next_caller_is_answered(control: ControlSocket, line: bytes) -> None:
-    refused = said(control, line)
+    refused = answer_to(control, line)
     assert not refused["ok"]
     assert refused["error"]
-    assert said(control, b'{"command": "step", "ticks": 3}') == {"ok": True, "value": 3}
+    assert answer_to(control, b'{"command": "step", "ticks": 3}') == {"ok": True, "value": 3}
 
 
 def serve_once(control: ControlSocket) -> None:
@@ -75,7 +75,7 @@ def serve_once(control: ControlSocket) -> None:
     control.serve()
 
 
-def test_a_swarm_is_found_and_told(control: ControlSocket) -> None:
+def test_a_swarm_is_found_and_takes_a_command(control: ControlSocket) -> None:
     server = threading.Thread(target=serve_once, args=(control,))
     server.start()
     assert ask_swarm(find_swarm(None), "step", ticks=5) == 5
