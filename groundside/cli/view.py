@@ -40,7 +40,7 @@ def watch(
     viewer: _Viewer = "web",
     browser: _Browser = True,
 ) -> None:
-    """Show a running swarm, what it has flown and what it goes on to; Ctrl-C detaches, and the swarm flies on."""
+    """Show a running swarm in a dashboard; Ctrl-C closes it, and the swarm flies on."""
     from ftcc.groundside.dashboard import Dashboard, Subject, events_of, watch_swarm
     from ftcc.groundside.results import Run
     from ftcc.groundside.swarm import find_swarm

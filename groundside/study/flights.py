@@ -131,7 +131,7 @@ def _new_stop_event() -> Any:
         return multiprocessing.get_context("spawn").Event()
     except (OSError, ImportError) as error:
         why = getattr(error, "strerror", None) or error
-        text = f"no semaphores for several processes ({why}; they are in /dev/shm): all flights use this process"
+        text = f"cannot use several processes ({why}; their semaphores need /dev/shm): all flights run in this one"
         warnings.warn(text, RuntimeWarning, stacklevel=3)
         return None
 

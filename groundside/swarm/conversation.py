@@ -175,7 +175,7 @@ class Conversation:
                         found[message.param_index] = (message.param_id, _value(message))
             if len(found) == count:
                 return dict(found[n] for n in sorted(found))
-        raise NoAnswerError(f"UAV {uav} has sent only {len(found)} of its parameters")
+        raise NoAnswerError(f"UAV {uav} sent only {len(found)} of its parameters")
 
     def _read(self, uav: int, name: str) -> tuple[float, int]:
         """Return value and type of a parameter."""

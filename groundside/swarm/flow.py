@@ -111,7 +111,7 @@ class Flow:
         """
         if math.isinf(speed) and not self.lockstep:
             raise FlowError(
-                "a swarm on the wall clock needs a finite speed; only a swarm in lockstep flies as fast as possible"
+                "a swarm on the wall clock needs a speed; only a swarm in lockstep can fly as fast as possible"
             )
         self.speed = speed
         if self.state != "flying":

@@ -58,7 +58,7 @@ class FlightInProgress:
         writable = not self.log.trouble
         self.log.write(event.t, event.text, event.uav, event.severity, **extra)
         if writable and self.log.trouble:
-            self.log_event(Event(event.t, "error", f"event logging stopped: {self.log.trouble}"))
+            self.log_event(Event(event.t, "error", f"events are no longer logged: {self.log.trouble}"))
 
     def log_scheduled_events(self) -> None:
         """Log the scenario's events whose time has come."""
@@ -111,8 +111,9 @@ class FlightInProgress:
             # The recording is empty or unreadable: the log has the reason.
             return
         except OSError as error:
-            what = f"not merged into signals.parquet: {error.strerror or error}; free disk space and run `ftcc report`"
-            self.log_event(Event(-1.0, "error", f"the processes' recordings are {what}"))
+            what = f"not merged into signals.parquet: {error.strerror or error}"
+            text = f"recordings are {what}; `ftcc report` merges them once there is space"
+            self.log_event(Event(-1.0, "error", text))
             return
         self.swarm.outcome.verdict = verdict
         try:

@@ -173,7 +173,7 @@ class Swarm:
     def start(self) -> None:
         """Start all processes."""
         # Imported here, because only the children need them.
-        from ftcc.airside.process import run as run_autopilots
+        from ftcc.airside.process import main as run_autopilots
         from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -14,7 +14,7 @@ from typing import Any
 
 from ftcc.airside.gcs import LINK_FIELDS
 from ftcc.groundside.dashboard import Event, LinkState, Snapshot, UavState
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Telemetry, TelemetrySocket
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, TelemetryMessage, TelemetrySocket
 from ftcc.link.flight_modes import NAMES as MODES
 from ftcc.link.flight_modes import mode_of
 from ftcc.sim.plant import TRUTH
@@ -112,14 +112,14 @@ class Monitor:
 
     def _end_log(self, error: OSError) -> None:
         self._log = None
-        self._log_error = f"telemetry logging stopped: {error.strerror or error}"
+        self._log_error = f"telemetry is no longer logged: {error.strerror or error}"
 
     def take_log_error(self) -> str:
         """Return why logging stopped, once; else an empty text."""
         error, self._log_error = self._log_error, ""
         return error
 
-    def _store(self, uav: _UavTelemetry, message: Telemetry) -> None:
+    def _store(self, uav: _UavTelemetry, message: TelemetryMessage) -> None:
         if message.kind == ARRAY:
             if message.name == "truth":
                 uav.t = message.stamp_us / 1e6

@@ -115,7 +115,7 @@ class Station(Conversation):
         NoAnswerError, RefusedError
         """
         if what not in _PARTS:
-            raise StationError(f"{what}: nothing of that name can fail; there are {', '.join(_PARTS)}")
+            raise StationError(f"{what}: cannot fail; parts that can fail are {', '.join(_PARTS)}")
         unit, instance = _PARTS[what]
         return self.inject(uav, unit, kind, instance, at=at, **sizes)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.mavlink import LOOPBACK, STATION
 
-__all__ = ["ARRAY", "HEARTBEAT", "Telemetry", "TelemetrySocket"]
+__all__ = ["ARRAY", "HEARTBEAT", "TelemetryMessage", "TelemetrySocket"]
 
 HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
 ARRAY = dialect.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY
@@ -30,7 +30,7 @@ _RECEIVE_BUFFER = 4 << 20
 """Size of the receive buffer, bytes; the kernel may grant less, and drops what does not fit."""
 
 
-class Telemetry(NamedTuple):
+class TelemetryMessage(NamedTuple):
     """One message of a UAV."""
 
     system: int
@@ -74,7 +74,7 @@ class TelemetrySocket:
         """Free the port."""
         self._socket.close()
 
-    def receive(self) -> Iterator[list[Telemetry]]:
+    def receive(self) -> Iterator[list[TelemetryMessage]]:
         """Yield the messages of each datagram that has arrived; drop damaged frames and non-finite values."""
         for _ in range(_DATAGRAMS_PER_READ):
             try:
@@ -86,7 +86,7 @@ class TelemetrySocket:
             else:
                 self.foreign_datagrams += 1
 
-    def parse(self, datagram: bytes) -> list[Telemetry]:
+    def parse(self, datagram: bytes) -> list[TelemetryMessage]:
         """Return the messages of a datagram, in order."""
         messages = _parse_frames(datagram)
         if messages is None:
@@ -94,18 +94,18 @@ class TelemetrySocket:
         return messages
 
 
-def _from_pymavlink(message: Any) -> Telemetry:
+def _from_pymavlink(message: Any) -> TelemetryMessage:
     """Convert a message that pymavlink has parsed."""
     system, kind, frame = message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf())
     if kind == HEARTBEAT:
-        return Telemetry(system, kind, frame, values=(message.custom_mode,))
+        return TelemetryMessage(system, kind, frame, values=(message.custom_mode,))
     stamp = getattr(message, "time_usec", 1000 * getattr(message, "time_boot_ms", 0))
     if kind == ARRAY:
-        return Telemetry(system, kind, frame, message.name, stamp, tuple(message.data))
-    return Telemetry(system, kind, frame, stamp_us=stamp)
+        return TelemetryMessage(system, kind, frame, message.name, stamp, tuple(message.data))
+    return TelemetryMessage(system, kind, frame, stamp_us=stamp)
 
 
-def _parse_frames(datagram: bytes) -> list[Telemetry] | None:
+def _parse_frames(datagram: bytes) -> list[TelemetryMessage] | None:
     """Return the messages of a datagram; None unless it consists only of intact frames listed in `_FORMATS`."""
     messages = []
     at, end = 0, len(datagram)
@@ -138,11 +138,11 @@ class _Format(NamedTuple):
     """Length of the full payload, bytes."""
     seed: bytes
     """Last byte of the checksummed data (CRC_EXTRA)."""
-    read: Callable[[int, int, bytes, bytes], Telemetry | None]
+    read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]
     """Function of system, kind, frame and full payload; returns None if a value is not finite."""
 
 
-def _format(message: Any, read: Callable[[int, int, bytes, bytes], Telemetry | None]) -> tuple[int, _Format]:
+def _format(message: Any, read: Callable[[int, int, bytes, bytes], TelemetryMessage | None]) -> tuple[int, _Format]:
     return message.id, _Format(message.id, message.unpacker.size, bytes([message.crc_extra]), read)
 
 
@@ -153,38 +153,40 @@ _HUD = struct.Struct("<4f")
 _ARRAY = struct.Struct("<QH10s58f")
 
 
-def _parse_heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry:
-    return Telemetry(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
+def _parse_heartbeat(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
+    return TelemetryMessage(system, kind, frame, values=(int.from_bytes(payload[:4], "little"),))
 
 
-def _parse_state(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
+def _parse_state(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
     stamp, *values = _STATE.unpack(payload)
-    return Telemetry(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
+    return TelemetryMessage(system, kind, frame, stamp_us=1000 * stamp) if math.isfinite(sum(values)) else None
 
 
-def _parse_hud(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
-    return Telemetry(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
+def _parse_hud(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
+    return TelemetryMessage(system, kind, frame) if math.isfinite(sum(_HUD.unpack_from(payload))) else None
 
 
-def _parse_unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> Telemetry:
-    return Telemetry(system, kind, frame)
+def _parse_unstamped(system: int, kind: int, frame: bytes, _payload: bytes) -> TelemetryMessage:
+    return TelemetryMessage(system, kind, frame)
 
 
-def _parser_with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], Telemetry]:
+def _parser_with_stamp(octets: int, unit: int) -> Callable[[int, int, bytes, bytes], TelemetryMessage]:
     """Return a parser of integer messages whose time comes first, in ``octets`` bytes and units of ``unit`` us."""
 
-    def read(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry:
-        return Telemetry(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
+    def read(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage:
+        return TelemetryMessage(system, kind, frame, stamp_us=unit * int.from_bytes(payload[:octets], "little"))
 
     return read
 
 
-def _parse_array(system: int, kind: int, frame: bytes, payload: bytes) -> Telemetry | None:
+def _parse_array(system: int, kind: int, frame: bytes, payload: bytes) -> TelemetryMessage | None:
     stamp, _, name, *values = _ARRAY.unpack(payload)
     # The sum of float32 as float64 is finite if, and only if, all are.
     if not math.isfinite(sum(values)):
         return None
-    return Telemetry(system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values))
+    return TelemetryMessage(
+        system, kind, frame, name.split(b"\0", 1)[0].decode("ascii", "replace"), stamp, tuple(values)
+    )
 
 
 _FORMATS = dict(

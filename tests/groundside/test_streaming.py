@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from ftcc.groundside import simulate
 from ftcc.groundside.claims.claims import evaluate
 from ftcc.groundside.cli.app import main
 from ftcc.groundside.results import Run, merging, run

@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from ftcc.groundside.dashboard.snapshot import LinkState
 from ftcc.groundside.swarm.monitor import Monitor
-from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, Telemetry, TelemetrySocket
+from ftcc.groundside.swarm.telemetry import ARRAY, HEARTBEAT, TelemetryMessage, TelemetrySocket
 from ftcc.link.codec import Codec, dialect
 from ftcc.link.flight_modes import MISSION, custom_mode
 from ftcc.link.mavlink import float_array
@@ -53,10 +53,10 @@ def station(pilot: socket.socket, tmp_path: Path) -> Iterator[Monitor]:
     made.close()
 
 
-def as_pymavlink_reads(datagram: bytes) -> list[Telemetry]:
+def as_pymavlink_reads(datagram: bytes) -> list[TelemetryMessage]:
     messages = []
     for message in Codec(254, 1).parse(datagram):
-        read = Telemetry(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
+        read = TelemetryMessage(message.get_srcSystem(), message.get_msgId(), bytes(message.get_msgbuf()))
         if read.kind == HEARTBEAT:
             read = read._replace(values=(message.custom_mode,))
         if read.kind == ARRAY:
@@ -259,7 +259,7 @@ def test_on_a_full_disk_the_log_ends_and_the_station_goes_on(pilot: socket.socke
     for n in range(200):
         pilot.send(codec.pack(float_array(10_000 * n, "truth", [1.0] * len(NAMES))))
         station.read()
-    assert station.take_log_error() == "telemetry logging stopped: No space left on device"
+    assert station.take_log_error() == "telemetry is no longer logged: No space left on device"
     assert station.take_log_error() == ""
     assert station.t == pytest.approx(1.99)
     station.close()
