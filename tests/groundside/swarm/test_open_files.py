@@ -87,5 +87,5 @@ def test_a_name_that_a_socket_cannot_have_is_refused(tmp_path: Path, monkeypatch
     monkeypatch.setenv("FTCC_RUNTIME_DIR", str(tmp_path))
     room = 107 - len(str(tmp_path / "ftcc" / ".feed"))
     registry.check_name("x" * room)
-    with pytest.raises(UserError, match=f"its name may have {room} bytes"):
+    with pytest.raises(UserError, match=f"its name may have at most {room} bytes"):
         registry.check_name("x" * (room + 1))
