@@ -18,7 +18,7 @@ from ftcc.airside.scheme import Heard, Reference
 from ftcc.airside.schemes import find
 from ftcc.link.mavlink import float_array
 from tests.airside.autopilot_bench import Bench, forged
-from tests.swarm import TRIM, autopilot, vehicle
+from tests.support.swarm import TRIM, autopilot, vehicle
 
 REPOSITORY = Path(__file__).parents[1]
 

@@ -18,8 +18,8 @@ from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.process import Vehicles
-from tests.pymavlink_wire import command_message, read_state
-from tests.swarm import TRIM, Swarm, timing, vehicle
+from tests.support.pymavlink_wire import command_message, read_state
+from tests.support.swarm import TRIM, Swarm, timing, vehicle
 
 START = {1: (29.5, 0.0, 1000.5, 0.01, 0.05, 0.02), 4: (30.5, 0.0, 999.7, 0.0, 0.02, 0.0)}
 """Away from equilibrium, so that every command differs from the one before."""

@@ -17,8 +17,8 @@ from ftcc.groundside.dashboard.panels import panels_of
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.scenario.mission import Mission
 from ftcc.groundside.simulation.one_process import PlainPython, simulate
-from tests.guests import EXAMPLE, forget_schemes, install
 from tests.sitl.conftest import same_flight
+from tests.support.guests import EXAMPLE, forget_schemes, install
 
 SCENARIO = EXAMPLE / "consensus.toml"
 SECONDS = 3.0

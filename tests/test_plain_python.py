@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plain_python import CASES, digest
+from tests.support.plain_python import CASES, digest
 
 SECONDS = 1.0
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.timeout(900)
 def in_plain_python() -> dict[tuple[str, ...], str]:
     """Hashes of all cases, flown without numba."""
     program = subprocess.run(
-        [sys.executable, "-m", "tests.plain_python", str(SECONDS)],
+        [sys.executable, "-m", "tests.support.plain_python", str(SECONDS)],
         cwd=Path(__file__).parents[1],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,

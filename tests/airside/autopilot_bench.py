@@ -17,8 +17,8 @@ from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint
 from ftcc.link.messages import StateMessage
 from ftcc.link.ports import reserve
 from ftcc.link.process import Setting
-from tests.pymavlink_wire import read_command, read_target, state_messages
-from tests.swarm import GRAPH, LEADERS, autopilot, timing
+from tests.support.pymavlink_wire import read_command, read_target, state_messages
+from tests.support.swarm import GRAPH, LEADERS, autopilot, timing
 
 FLIGHT = Flight(GRAPH, 0.01, 0.05, 0.05, 2.0, False)
 """What the law's conditions are checked against."""

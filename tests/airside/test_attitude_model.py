@@ -16,7 +16,7 @@ from ftcc.airside.attitude_model import (
 )
 from ftcc.airside.elements.vectors import added, applied
 from ftcc.sim.airframe import attitude_rates
-from tests.swarm import AIRFRAME, nominal
+from tests.support.swarm import AIRFRAME, nominal
 
 MODEL = nominal(thrust=120.0, elevator=1.0, sideways=1.0)
 NO_LIFT = AIRFRAME._replace(CLde=0.0)

@@ -10,7 +10,7 @@ import pytest
 from ftcc.airside.flight_path import Own
 from ftcc.airside.scheme import Flight, Heard, Reference
 from ftcc.airside.schemes import find
-from tests.swarm import AIRFRAME, FOLLOWERS, GRAPH, Swarm, nominal
+from tests.support.swarm import AIRFRAME, FOLLOWERS, GRAPH, Swarm, nominal
 
 SCHEME = find("containment")
 LAW = SCHEME.module

@@ -15,7 +15,7 @@ from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State
 from ftcc.sim.sensors import encode_state
 from ftcc.sim.trim import trim
-from tests.swarm import AIRFRAME, nominal, vehicle
+from tests.support.swarm import AIRFRAME, nominal, vehicle
 
 TRAVEL = 0.5
 MODEL = nominal(thrust=120.0, elevator=0.8, sideways=TRAVEL)

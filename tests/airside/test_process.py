@@ -13,7 +13,7 @@ import pytest
 from ftcc.link.mavlink import dialect, float_array
 from ftcc.link.waiting import DATAGRAM
 from tests.airside.autopilot_bench import Bench, forged
-from tests.pymavlink_wire import read_command, state_messages
+from tests.support.pymavlink_wire import read_command, state_messages
 
 LEVEL = forged(1000.0, 30.0, 0.0, 0.0322, 0.0)
 

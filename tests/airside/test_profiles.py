@@ -24,7 +24,7 @@ from ftcc.airside.references.profiles import (
     trigger_rows,
 )
 from ftcc.airside.scheme import Reference
-from tests.swarm import profile
+from tests.support.swarm import profile
 
 X, V, V_DOT, Z, Z_DOT, Z_DDOT, X_DOT = (
     Reference._fields.index(name) for name in ("x", "V", "V_dot", "z", "z_dot", "z_ddot", "x_dot")

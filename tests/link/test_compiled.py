@@ -27,7 +27,7 @@ from ftcc.link.compiled import (
     store,
     width,
 )
-from tests.swarm import AIRFRAME
+from tests.support.swarm import AIRFRAME
 
 REPOSITORY = Path(__file__).parents[2]
 PACKAGES = Path(ftcc.link.__file__).parents[1]
@@ -167,7 +167,7 @@ def test_old_caches_are_cleared_away(tmp_path):
 @pytest.mark.parametrize(("form", "seconds"), [("flight", 1.5), ("monograph", 0.2)])
 def test_a_flight_in_plain_python_has_the_same_bits(form, seconds):
     """Law, plant, channel, noise and both codecs, of eight UAVs amid loss, noise, a cut, a fault and disturbances."""
-    flight = ["-m", "tests.swarm", form, str(seconds)]
+    flight = ["-m", "tests.support.swarm", form, str(seconds)]
     assert run(flight, NUMBA_DISABLE_JIT="1") == run(flight, NUMBA_DISABLE_JIT="0")
 
 

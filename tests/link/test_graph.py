@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftcc.link.graph import Assumption, Graph, GraphError
-from tests.swarm import FOLLOWERS, GRAPH, LEADERS, WEIGHTS
+from tests.support.swarm import FOLLOWERS, GRAPH, LEADERS, WEIGHTS
 
 HULL_WEIGHTS = [
     (0.88492, 0.11508),

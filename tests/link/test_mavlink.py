@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, SIMULATOR, Endpoint, dialect, float_array, status_text
-from tests.pymavlink_wire import command_message, read_command, read_state, state_messages
+from tests.support.pymavlink_wire import command_message, read_command, read_state, state_messages
 
 
 class Pair:

@@ -28,7 +28,7 @@ from ftcc.link.wire import (
     send_position_target,
     send_state,
 )
-from tests import pymavlink_wire as reference
+from tests.support import pymavlink_wire as reference
 
 RANDOM = np.random.default_rng(1)
 STATE = (RANDOM.normal(size=13) * 100.0).astype(np.float32).astype(np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftcc.sim.airframe import longitudinal_rates
-from tests.swarm import AIRFRAME
+from tests.support.swarm import AIRFRAME
 
 NONE = (0.0, 0.0, 0.0)
 

@@ -20,7 +20,7 @@ from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State, initial
 from ftcc.sim.sensors import encode_state
 from ftcc.sim.spec import VehicleSpec
-from tests.swarm import AIRFRAME, TRIM, vehicle
+from tests.support.swarm import AIRFRAME, TRIM, vehicle
 
 advance, truth, actuate = (getattr(cycle_of("attitude"), name) for name in ("advance", "truth", "actuate"))
 

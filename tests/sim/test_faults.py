@@ -18,7 +18,7 @@ from ftcc.sim.injection import SPARE, faults_of, inject
 from ftcc.sim.navigation import ATTITUDE, POSITION, NavigationFault
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.spec import VehicleSpec
-from tests.swarm import LEADER, TRIM, vehicle
+from tests.support.swarm import LEADER, TRIM, vehicle
 
 cycle = cycle_of("longitudinal")
 MS = 1000

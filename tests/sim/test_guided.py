@@ -17,7 +17,7 @@ from ftcc.sim.inner_loop import load_factor
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.guided import Parameters, State, initial, level
-from tests.swarm import vehicle
+from tests.support.swarm import vehicle
 
 cycle = cycle_of("guided")
 

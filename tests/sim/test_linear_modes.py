@@ -7,7 +7,7 @@ import pytest
 
 from ftcc.sim.airframe import Airframe, scaled
 from ftcc.sim.linear_modes import STATES, linearize, modes
-from tests.swarm import AIRFRAME
+from tests.support.swarm import AIRFRAME
 
 HIGHER = scaled(AIRFRAME, {"all": 1.2, "CLde": 1.0})
 

@@ -9,7 +9,7 @@ from ftcc.link.events import drain_events, new_events, note
 from ftcc.sim.build import build_fleet
 from ftcc.sim.obstacles import ENTERED, Obstacle, clearance, watch, zones_of
 from ftcc.sim.plants import cycle_of
-from tests.swarm import vehicle
+from tests.support.swarm import vehicle
 
 HILLS = (Obstacle(2500.0, 4500.0, 430.0), Obstacle(4000.0, 6000.0, 450.0))
 ZONES = zones_of(HILLS)

@@ -20,7 +20,7 @@ from ftcc.sim.fleet import Fleet
 from ftcc.sim.plant import LOST, TRUTH, Guards
 from ftcc.sim.plants import conditions_of, cycle_of
 from ftcc.sim.spec import VehicleSpec
-from tests.swarm import AIRFRAME, LEADER, TRIM, vehicle
+from tests.support.swarm import AIRFRAME, LEADER, TRIM, vehicle
 
 cycle = cycle_of("longitudinal")
 advance, conditions, truth = cycle.advance, cycle.conditions, cycle.truth

@@ -18,7 +18,7 @@ from ftcc.sim.plant import LOST, TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.position import Disturbances, Inputs, Parameters, State, drag, initial, rates, wind_speed
 from ftcc.sim.spec import VehicleSpec
-from tests.swarm import vehicle
+from tests.support.swarm import vehicle
 
 cycle = cycle_of("position")
 

@@ -14,7 +14,7 @@ from ftcc.sim.build import build_fleet
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.sensors import encode_state
-from tests.swarm import noise, vehicle
+from tests.support.swarm import noise, vehicle
 
 LOWEST = {
     "x": -1e4, "y": -2e3, "z": -100.0, "V": 12.0, "gamma": -0.6, "chi": -3.1, "mu": -1.3, "alpha": -0.2, "beta": -0.3,

@@ -20,7 +20,7 @@ from ftcc.sim.plants.position import drag
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import AIR, DiscreteGust, Turbulence, against, blow, dryden, moving_air
 from tests.sim.test_position import UAV, point
-from tests.swarm import AIRFRAME, vehicle
+from tests.support.swarm import AIRFRAME, vehicle
 
 SURFACES = ((-0.7, 0.7),) * 3 + ((0.0, 120.0),)
 

@@ -25,8 +25,8 @@ from ftcc.groundside.cli.app import app
 from ftcc.groundside.scenario.loading import read, shipped
 from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
-from tests.guests import EXAMPLE, forget_schemes, install
 from tests.sitl.conftest import FTCC, Flight
+from tests.support.guests import EXAMPLE, forget_schemes, install
 
 REPOSITORY = Path(__file__).parents[2]
 FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")

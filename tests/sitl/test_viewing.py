@@ -20,8 +20,8 @@ from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.feed import watch_swarm
 from ftcc.groundside.dashboard.snapshot import Event, Snapshot
 from ftcc.groundside.dashboard.viewer import viewer_program
-from tests import rrd
 from tests.sitl.conftest import Flight
+from tests.support import rrd
 
 DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
 UAVS = range(1, 9)

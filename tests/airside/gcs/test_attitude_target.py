@@ -15,7 +15,7 @@ from ftcc.link.mavlink import dialect
 from ftcc.link.rotation import body_attitude
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, MU, TRUTH, V
 from ftcc.sim.sensors import encode_state
-from tests.swarm import AIRFRAME, autopilot
+from tests.support.swarm import AIRFRAME, autopilot
 
 NOBODY = Own(*(0.0,) * len(Own._fields))
 

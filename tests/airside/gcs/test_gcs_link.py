@@ -25,7 +25,7 @@ from ftcc.link.flight_modes import HOLD, MISSION
 from ftcc.link.mavlink import LOOPBACK
 from tests.airside.autopilot_bench import Bench
 from tests.airside.gcs.in_flight import LEVEL, M, ask, said
-from tests.pymavlink_wire import state_messages
+from tests.support.pymavlink_wire import state_messages
 
 # Questions.
 

@@ -8,7 +8,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.scheme import Flight, Heard, Reference
 from ftcc.link.graph import Graph
-from tests.swarm import nominal
+from tests.support.swarm import nominal
 
 MISSION = Reference(0.0, 30.0, 0.0, 1000.0, 0.0, 0.0)
 

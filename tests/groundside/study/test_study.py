@@ -22,7 +22,7 @@ from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation.cases import claims_in_flight
 from ftcc.groundside.study import Outcome, draw, flights, fly_all, plan_study, table, write
-from tests.guests import EXAMPLE, forget_schemes, install
+from tests.support.guests import EXAMPLE, forget_schemes, install
 
 SECONDS = 2.0
 TOO_STEEP = 1e-4

@@ -10,7 +10,7 @@ from pathlib import Path
 from ftcc.airside import schemes
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 
-EXAMPLE = Path(__file__).parent / "example_scheme"
+EXAMPLE = Path(__file__).parents[1] / "example_scheme"
 
 
 def install(source: Path, target: Path, more: Mapping[str, str] | None = None) -> None:

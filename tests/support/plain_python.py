@@ -1,6 +1,7 @@
 """The first seconds of every shipped scenario in every form, as hashes of all their bits.
 
-``NUMBA_DISABLE_JIT=1 python -m tests.plain_python SECONDS`` prints them for plain Python, ``0`` for compiled code.
+``NUMBA_DISABLE_JIT=1 python -m tests.support.plain_python SECONDS`` prints them for plain Python,
+``NUMBA_DISABLE_JIT=0`` for compiled code.
 """
 
 from __future__ import annotations
