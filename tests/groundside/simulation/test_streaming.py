@@ -78,7 +78,7 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
 
 
 def test_parts_are_joined_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.groundside.test_run import write_parts
+    from tests.groundside.results.test_run import write_parts
 
     whole = one_process.simulate(of_a_loss(), tmp_path / "whole")
 
