@@ -9,7 +9,7 @@ from .claims import uavs_of as uavs_of
 from .expressions import DERIVED as DERIVED
 from .expressions import Signals as Signals
 from .expressions import check_expression as check_expression
-from .expressions import evaluated as evaluated
+from .expressions import evaluate_expression as evaluate_expression
 from .expressions import names_in as names_in
 from .expressions import uavs_in as uavs_in
 from .expressions import unwrapped as unwrapped

@@ -14,7 +14,7 @@ from ftcc.groundside.claims.expressions import (
     DERIVED,
     Signals,
     check_expression,
-    evaluated,
+    evaluate_expression,
     names_in,
     uavs_in,
     window_of,
@@ -135,9 +135,9 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
             if names_in(claim.signal) & set(DERIVED) and not led:
                 problems.append(f"{where}: signal {claim.signal!r} needs leaders that reach every follower")
             others = uavs_in(claim.signal)
-        strangers = sorted((set(uavs_of(claim, graph)) | others) - set(graph.uavs))
-        if strangers:
-            problems.append(f"{where}: uavs {', '.join(map(str, strangers))} do not exist")
+        unknown = sorted((set(uavs_of(claim, graph)) | others) - set(graph.uavs))
+        if unknown:
+            problems.append(f"{where}: uavs {', '.join(map(str, unknown))} do not exist")
         for case, expected in claim.expected.items():
             tolerance = by_case(claim.tolerance, case)
             if tolerance is None:
@@ -165,7 +165,7 @@ def evaluate(
     end = max(
         (float(signals.column("t", uav)[-1]) for uav in signals.uavs if len(signals.column("t", uav))), default=-1.0
     )
-    return [_result(signals, claim, case, graph, end, duration) for claim in claims if case in claim.expected]
+    return [_evaluate_claim(signals, claim, case, graph, end, duration) for claim in claims if case in claim.expected]
 
 
 def failed(results: Iterable[Result]) -> list[Result]:
@@ -173,7 +173,7 @@ def failed(results: Iterable[Result]) -> list[Result]:
     return [result for result in results if result.ok is False]
 
 
-def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float, duration: float) -> Result:
+def _evaluate_claim(signals: Signals, claim: Claim, case: str, graph: Graph, end: float, duration: float) -> Result:
     uavs = uavs_of(claim, graph)
     expected = claim.expected[case]
     tolerance = tolerance_of(by_case(claim.tolerance, case))
@@ -192,7 +192,7 @@ def _result(signals: Signals, claim: Claim, case: str, graph: Graph, end: float,
             return result(None, False, f"UAV {uav} was lost")
         parts = claim.within or [claim.window]
         rows = np.concatenate([np.arange(len(t))[window_of(t, part)] for part in parts])
-        x = evaluated(claim.signal, signals, graph, uav)[rows]
+        x = evaluate_expression(claim.signal, signals, graph, uav)[rows]
         if len(x) == 0:
             return result(None, None, "no row in the window")
         values.append(metric.function(t[rows], x, threshold))

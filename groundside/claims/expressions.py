@@ -28,7 +28,7 @@ __all__ = [
     "DERIVED",
     "Signals",
     "check_expression",
-    "evaluated",
+    "evaluate_expression",
     "names_in",
     "uavs_in",
     "unwrapped",
@@ -138,7 +138,7 @@ _SWARM_FUNCTIONS: dict[str, Callable[[Array, int, Graph], Array]] = {
 
 
 @functools.cache
-def _parsed(expression: str) -> ast.expr:
+def _parse(expression: str) -> ast.expr:
     try:
         return ast.parse(expression.strip(), mode="eval").body
     except SyntaxError as error:
@@ -156,7 +156,7 @@ def names_in(expression: str) -> frozenset[str]:
     """
     names = set()
     called = set()
-    for node in ast.walk(_parsed(expression)):
+    for node in ast.walk(_parse(expression)):
         if isinstance(node, ast.Call):
             known = {**_FUNCTIONS, **_SWARM_FUNCTIONS}
             if not isinstance(node.func, ast.Name) or node.func.id not in known or node.keywords:
@@ -173,13 +173,13 @@ def names_in(expression: str) -> frozenset[str]:
             if not isinstance(node.value, (int, float)) or isinstance(node.value, bool):
                 raise ValueError(f"{expression!r}: {node.value!r} is not a number")
         elif isinstance(node, ast.Subscript):
-            _other(expression, node)
+            _subscript(expression, node)
         elif not isinstance(node, (ast.operator, ast.unaryop, ast.expr_context)):
             raise ValueError(f"{expression!r}: only arithmetic over columns is allowed")
     return frozenset(name for key, name in names if key not in called)
 
 
-def _other(expression: str, node: ast.Subscript) -> tuple[str, int]:
+def _subscript(expression: str, node: ast.Subscript) -> tuple[str, int]:
     """Column and UAV of ``z[4]``."""
     name, uav = node.value, node.slice
     if isinstance(name, ast.Name) and isinstance(uav, ast.Constant) and type(uav.value) is int:
@@ -189,8 +189,8 @@ def _other(expression: str, node: ast.Subscript) -> tuple[str, int]:
 
 def uavs_in(expression: str) -> set[int]:
     """The UAVs that an expression names."""
-    subscripts = (node for node in ast.walk(_parsed(expression)) if isinstance(node, ast.Subscript))
-    return {_other(expression, node)[1] for node in subscripts}
+    subscripts = (node for node in ast.walk(_parse(expression)) if isinstance(node, ast.Subscript))
+    return {_subscript(expression, node)[1] for node in subscripts}
 
 
 def check_expression(expression: str, columns: Iterable[str]) -> None:
@@ -201,11 +201,11 @@ def check_expression(expression: str, columns: Iterable[str]) -> None:
         raise ValueError(f"{expression!r}: there is no column {', '.join(unknown)}; there are {', '.join(known)}")
 
 
-def evaluated(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
+def evaluate_expression(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
     """An expression for one UAV, at all its recorded times."""
     t = signals.column("t", uav)
     with np.errstate(all="ignore"):
-        result = np.asarray(_value(_parsed(expression), signals, graph, uav), np.float64)
+        result = np.asarray(_value(_parse(expression), signals, graph, uav), np.float64)
     return np.broadcast_to(result, t.shape)
 
 
@@ -216,7 +216,7 @@ def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> An
         rows = []
         for other in graph.followers:
             times = signals.column("t", other)
-            rows.append(_at(t, times, np.broadcast_to(_value(node, signals, graph, other), times.shape)))
+            rows.append(_values_at(t, times, np.broadcast_to(_value(node, signals, graph, other), times.shape)))
         return np.array(rows)
 
     def value(node: ast.expr) -> Any:
@@ -233,8 +233,8 @@ def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> An
         if isinstance(node, ast.Name):
             return _column(node.id, signals, graph, uav)
         if isinstance(node, ast.Subscript):
-            name, other = _other(ast.unparse(expression), node)
-            return _at(t, signals.column("t", other), _column(name, signals, graph, other))
+            name, other = _subscript(ast.unparse(expression), node)
+            return _values_at(t, signals.column("t", other), _column(name, signals, graph, other))
         assert isinstance(node, ast.Constant)
         assert isinstance(node.value, (int, float))
         return np.float64(node.value)
@@ -242,7 +242,7 @@ def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> An
     return value(expression)
 
 
-def _at(t: Array, times: Array, values: Array) -> Array:
+def _values_at(t: Array, times: Array, values: Array) -> Array:
     """``values`` of ``times`` at the times ``t``; nan where there is none."""
     if np.array_equal(t, times):
         return values
@@ -258,7 +258,7 @@ def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
     if name not in DERIVED:
         return signals.column(name, uav)
     along = (_PLACES | _DISTANCES)[name]
-    leaders = _leaders_columns(along, signals, graph, signals.column("t", uav))
+    leaders = _leader_columns(along, signals, graph, signals.column("t", uav))
     if name in _DISTANCES:
         own = signals.column(along, uav)
         outside: Array = np.maximum(np.maximum(leaders.min(axis=0) - own, own - leaders.max(axis=0)), 0.0)
@@ -269,13 +269,13 @@ def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
     return place
 
 
-def _leaders_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Array:
+def _leader_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Array:
     """A column of the leaders at times ``t``, shape (leaders, n); nan where a leader was not recorded."""
     try:
         graph.require(Assumption.LEADERS_REACH_ALL)
     except GraphError as error:
         raise ValueError(f"{', '.join(DERIVED)} need leaders: {error}") from None
-    return np.array([_at(t, signals.column("t", uav), signals.column(name, uav)) for uav in graph.leaders])
+    return np.array([_values_at(t, signals.column("t", uav), signals.column(name, uav)) for uav in graph.leaders])
 
 
 def window_of(t: Array, window: tuple[float, float]) -> slice:

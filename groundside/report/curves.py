@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.claims import DERIVED, Signals, evaluated, names_in, uavs_in, window_of
+from ftcc.groundside.claims import DERIVED, Signals, evaluate_expression, names_in, uavs_in, window_of
 from ftcc.groundside.report.definitions import Panel
 
 if TYPE_CHECKING:
@@ -88,13 +88,13 @@ def curves_of(
         t = flight.signals.column("t", uav)
         if len(t) == 0 or (other is not None and len(flight.signals.column("t", other)) == 0):
             continue
-        values = evaluated(y, flight.signals, graph, uav)
+        values = evaluate_expression(y, flight.signals, graph, uav)
         name = f"UAV {uav}"
         if other is not None:
-            theirs = evaluated(y, flight.signals, graph, other)
+            theirs = evaluate_expression(y, flight.signals, graph, other)
             rows = min(len(values), len(theirs))
             t, values, name = t[:rows], values[:rows] - theirs[:rows], f"{uav} - {other}"
-        along = t if x == "t" else evaluated(x, flight.signals, graph, uav)[: len(t)]
+        along = t if x == "t" else evaluate_expression(x, flight.signals, graph, uav)[: len(t)]
         rows_ = window_of(t, window) if window is not None else slice(None)
         if len(t[rows_]):
             yield Curve(name, uav, along[rows_], values[rows_])

@@ -11,7 +11,7 @@ from ftcc.groundside.claims import Result
 from ftcc.groundside.report.readings import Compared
 from ftcc.groundside.report.terminal import number, summary
 from ftcc.groundside.text import ids
-from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict, size
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict, with_unit
 
 if TYPE_CHECKING:
     from ftcc.groundside.report.drawing import Drawn
@@ -104,9 +104,11 @@ def verdict_section(verdict: Verdict) -> Section:
     rows += [[Cell(""), Cell(""), Cell(text, "error"), Cell("")] for text in verdict.failures]
     rows += [[Cell(""), Cell(""), Cell(text, "warning"), Cell("")] for text in verdict.remarks]
     for error in verdict.tracking:
-        largest = f"{size(error.largest, error.unit)} at {error.at:.1f} s"
-        allowed = "" if error.allowed is None else f" ({size(error.allowed, error.unit)} allowed)"
-        end = "" if error.end is None else f"in the end {size(error.end, error.unit)}, UAV {error.end_uav}{allowed}"
+        largest = f"{with_unit(error.largest, error.unit)} at {error.at:.1f} s"
+        allowed = "" if error.allowed is None else f" ({with_unit(error.allowed, error.unit)} allowed)"
+        end = (
+            "" if error.end is None else f"in the end {with_unit(error.end, error.unit)}, UAV {error.end_uav}{allowed}"
+        )
         rows.append([Cell(f"{error.meaning}, {error.name}"), Cell(str(error.uav)), Cell(largest), Cell(end)])
     for left in verdict.outside:
         until = "in the end" if left.at_end else f"until {left.until:.1f} s"
@@ -115,7 +117,7 @@ def verdict_section(verdict: Verdict) -> Section:
         what = f"{one.actuator.replace('_', ' ')} at its limits"
         rows.append([Cell(what), Cell(str(one.uav)), Cell(f"{100.0 * one.share:.2g} % of the time"), Cell("")])
     for cycle in verdict.limit_cycles:
-        about = f"+-{size(cycle.amplitude, cycle.unit)}"
+        about = f"+-{with_unit(cycle.amplitude, cycle.unit)}"
         what = f"limit cycle of {cycle.signal.replace('_', ' ')}"
         rows.append([Cell(what), Cell(str(cycle.uav)), Cell(f"{cycle.frequency:.3g} rad/s"), Cell(about)])
     heads = [Head("what"), Head("UAV"), Head("found"), Head("")]

@@ -14,7 +14,7 @@ from ftcc.groundside.errors import UserError
 
 __all__ = ["BusyFolderError", "NothingRecordedError", "RunError", "new_folder", "sole_writer"]
 
-_kept: dict[tuple[int, int], int] = {}
+_locks: dict[tuple[int, int], int] = {}
 """Descriptors of the folders that this process keeps to its end, by device and inode."""
 
 
@@ -42,22 +42,22 @@ def sole_writer(folder: Path) -> Iterator[None]:
         If it cannot be created.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    descriptor = _locked(folder)
+    descriptor = _lock(folder)
     try:
         yield
     finally:
         os.close(descriptor)
 
 
-def keep(folder: Path) -> None:
+def lock_until_exit(folder: Path) -> None:
     """As `sole_writer`, of a folder that is there, until this process ends, however it ends."""
     status = folder.stat()
     place = status.st_dev, status.st_ino
-    if place not in _kept:
-        _kept[place] = _locked(folder)
+    if place not in _locks:
+        _locks[place] = _lock(folder)
 
 
-def _locked(folder: Path) -> int:
+def _lock(folder: Path) -> int:
     """A descriptor that holds the kernel's lock on a folder. It leaves no file behind."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -71,7 +71,7 @@ def _locked(folder: Path) -> int:
     return descriptor
 
 
-_HELD = ("scenario.toml", "study.parquet")
+_RESULT_FILES = ("scenario.toml", "study.parquet")
 """What shows that a folder has a run or a study in it."""
 
 
@@ -101,14 +101,14 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> 
             raise PermissionError(f"no permission to write into {folder}")
         if out is None:
             folder = _first_free(folder / f"{name}-{datetime.now():%Y%m%d-%H%M%S}")
-        keep(folder)
-        held = [file for file in _HELD if (folder / file).exists()]
+        lock_until_exit(folder)
+        found = [file for file in _RESULT_FILES if (folder / file).exists()]
     except OSError as error:
         instead = "; choose another folder with --out" if out is None else ""
         option = "" if out is None else "--out "
         raise RunError(f"{option}{folder}: cannot be written: {error.strerror or error}{instead}") from None
-    if held:
-        raise RunError(f"--out {folder}: already holds {held[0]}; give a folder that is empty or does not exist")
+    if found:
+        raise RunError(f"--out {folder}: already holds {found[0]}; give a folder that is empty or does not exist")
     return folder
 
 

@@ -118,14 +118,14 @@ def _blocks(parts: Sequence[_Part], names: Sequence[str]) -> Iterator[dict[str, 
             part.fill(max(1, _BLOCK // len(uavs)))
         until = min(part.until for part in parts)
         tables = {uav: [part.take(until) for part in parts if part.uav == uav] for uav in uavs}
-        joined = [_joined(uav, tables[uav], names) for uav in uavs]
+        joined = [_join(uav, tables[uav], names) for uav in uavs]
         values = {name: np.concatenate([one[name] for one in joined]) for name in joined[0]}
         if len(values["t"]):
             order = np.lexsort((values["uav"], values["t"]))
             yield {name: column[order] for name, column in values.items()}
 
 
-def _joined(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
+def _join(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
     """The parts of one UAV side by side, a row for every time that occurs."""
     times = [table.column("t").to_numpy() for table in tables]
     t = np.unique(np.concatenate(times))

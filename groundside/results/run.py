@@ -43,9 +43,9 @@ class Run:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._kept: dict[tuple[str, int], NDArray[Any]] = {}
+        self._cache: dict[tuple[str, int], NDArray[Any]] = {}
         """Columns by name and UAV, what was asked for last at the end."""
-        self._used = 0
+        self._cached_bytes = 0
         """Bytes of them."""
         if not (self.path / "scenario.toml").is_file():
             raise RunError(f"{self.path}: is not the folder of a run (it contains no scenario.toml)")
@@ -204,15 +204,15 @@ class Run:
             raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
         if uav not in self._rows:
             return np.empty(0)
-        if (name, uav) not in self._kept:
+        if (name, uav) not in self._cache:
             # Of a short flight, others will be asked for next; of a long one, there is no room for theirs.
             small = 8 * self._open.metadata.num_rows <= _MEMORY / 4
             for one, values in self._read(name, list(self._rows) if small else [uav]).items():
-                self._kept[name, one] = values
-                self._used += values.nbytes
-        found = self._kept[name, uav] = self._kept.pop((name, uav))
-        while self._used > _MEMORY and len(self._kept) > 1:
-            self._used -= self._kept.pop(next(iter(self._kept))).nbytes
+                self._cache[name, one] = values
+                self._cached_bytes += values.nbytes
+        found = self._cache[name, uav] = self._cache.pop((name, uav))
+        while self._cached_bytes > _MEMORY and len(self._cache) > 1:
+            self._cached_bytes -= self._cache.pop(next(iter(self._cache))).nbytes
         return found
 
     def merge(self) -> Path:

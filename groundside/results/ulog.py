@@ -61,8 +61,8 @@ def _log_of(run: Run, uav: int) -> Any:
     log = ULog(None)
     stamps = np.rint(run.column("t", uav) * 1e6).astype(np.uint64)
     recorded = {name: run.column(name, uav) for name in run.names if name not in ("t", "uav")}
-    told = {name: values for name, values in recorded.items() if not np.isnan(values).all()}
-    _add(log, "ftcc_recording", stamps, [(name, "double", values) for name, values in told.items()])
+    columns = {name: values for name, values in recorded.items() if not np.isnan(values).all()}
+    _add(log, "ftcc_recording", stamps, [(name, "double", values) for name, values in columns.items()])
     _add_flight(log, run, stamps, recorded)
     scheme = run.mission.scheme
     for spec in run.mission.autopilots:
@@ -87,7 +87,7 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
     if any(name not in recorded for name in TRUTH):
         raise RunError(f"{run.path}: the vehicles recorded nothing: there is no column {', '.join(TRUTH)}")
     truth = np.column_stack([recorded[name] for name in TRUTH])
-    chosen = _thinned(stamps, np.isfinite(truth[:, :6]).all(axis=1))
+    chosen = _thin(stamps, np.isfinite(truth[:, :6]).all(axis=1))
     if not len(chosen):
         return
     t = stamps[chosen]
@@ -133,7 +133,7 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
     )
 
 
-def _thinned(stamps: NDArray[np.uint64], wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _thin(stamps: NDArray[np.uint64], wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Rows that are ``wanted``, at most `_RATE` a second."""
     rows = np.flatnonzero(wanted)
     bins = (stamps[rows].astype(np.int64) * int(_RATE)) // 1_000_000

@@ -9,7 +9,7 @@ import platform
 import tomli_w
 
 from ftcc.airside.scheme import Scheme
-from ftcc.groundside.scenario.laws import followed_by_gains
+from ftcc.groundside.scenario.laws import mission_values_for_gains
 from ftcc.groundside.scenario.loading import Scenario
 
 __all__ = ["as_flown"]
@@ -24,7 +24,7 @@ def _versions() -> dict[str, str]:
 
 
 def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
-    gains = scheme.gains(scenario.form, scenario.plan.gains.common, followed_by_gains(scenario.plan))
+    gains = scheme.gains(scenario.form, scenario.plan.gains.common, mission_values_for_gains(scenario.plan))
     return gains._asdict()  # type: ignore[no-any-return]
 
 

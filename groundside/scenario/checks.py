@@ -52,6 +52,9 @@ class Findings:
     def refuse(self, text: str) -> None:
         self.refused.append(text)
 
+    def warn(self, text: str) -> None:
+        self.warned.append(text)
+
     def stop_if_refused(self) -> None:
         if self.refused:
             raise self.scenario.error(list(dict.fromkeys(self.refused)))
@@ -190,8 +193,8 @@ def check_delays(plan: Plan, timing: Timing, findings: Findings) -> None:
 def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
     """The communication graph, which must satisfy the scheme's assumption."""
     followers, leaders = tuple(plan.uavs.followers), tuple(plan.uavs.leaders)
-    known = followers + leaders
-    twice = sorted({uav for uav in known if known.count(uav) > 1})
+    uavs = followers + leaders
+    twice = sorted({uav for uav in uavs if uavs.count(uav) > 1})
     if twice:
         findings.refuse(f"uavs: UAV {', '.join(map(str, twice))} is listed twice")
     if set(plan.leaders) != set(leaders):
@@ -200,38 +203,36 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
     for n, edge in enumerate(plan.graph.edges):
         for receiver, sender in edge.directed:
             for uav in (receiver, sender):
-                if uav not in known:
-                    findings.refuse(f"graph.edges.{n}: there is no UAV {uav}; UAVs are {', '.join(map(str, known))}")
+                if uav not in uavs:
+                    findings.refuse(f"graph.edges.{n}: there is no UAV {uav}; UAVs are {', '.join(map(str, uavs))}")
             if (receiver, sender) in weights:
                 findings.refuse(f"graph.edges.{n}: edge {sender} -> {receiver} is listed twice")
             weights[receiver, sender] = edge.weight
-    known_to_graph = {pair: weight for pair, weight in weights.items() if set(pair) <= set(known)}
+    known_weights = {pair: weight for pair, weight in weights.items() if set(pair) <= set(uavs)}
     findings.stop_if_refused()
     try:
-        graph = Graph(followers, leaders, known_to_graph)
+        graph = Graph(followers, leaders, known_weights)
         graph.require(scheme.graph)
     except GraphError as error:
         findings.refuse(f"graph.edges: {error}")
         findings.stop_if_refused()
         raise
-    _warn_of_edges(graph, findings)
+    _warn_of_ineffective_edges(graph, findings)
     return graph
 
 
-def _warn_of_edges(graph: Graph, findings: Findings) -> None:
+def _warn_of_ineffective_edges(graph: Graph, findings: Findings) -> None:
     """Say which edges and leaders are without effect."""
     for (receiver, sender), weight in graph.weights.items():
         if receiver in graph.leaders and sender in graph.followers:
-            findings.warned.append(
-                f"graph.edges: {sender} -> {receiver} has no effect: leaders do not receive from followers"
-            )
+            findings.warn(f"graph.edges: {sender} -> {receiver} has no effect: leaders do not receive from followers")
         elif weight < _NEGLIGIBLE * max(graph.weights.values()):
-            findings.warned.append(
+            findings.warn(
                 f"graph.edges: {sender} -> {receiver} has weight {weight:g}, which is negligible beside the others"
             )
     for leader in graph.leaders:
         if not graph.receivers(leader):
-            findings.warned.append(f"graph.edges: no UAV receives from leader {leader}")
+            findings.warn(f"graph.edges: no UAV receives from leader {leader}")
 
 
 def require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Findings) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from ftcc.sim.plant import TRUTH
 
-__all__ = ["LEADING", "leading"]
+__all__ = ["LEADING", "leading_columns"]
 
 _SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
@@ -14,7 +14,7 @@ LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
 """The first columns of ``signals.parquet``, of all plants; the scheme's SIGNALS follow."""
 
 
-def leading(actuators: Collection[str]) -> list[str]:
+def leading_columns(actuators: Collection[str]) -> list[str]:
     """Those of an aircraft with these actuators."""
     lacking = {name for name in _SHOWN if name not in actuators}
     return [name for name in LEADING if name.removesuffix("_command") not in lacking]

@@ -7,7 +7,7 @@ from types import ModuleType
 
 from ftcc.airside.references.profiles import Profile
 from ftcc.groundside.scenario.checks import Findings
-from ftcc.groundside.scenario.trims import disturbances_at, instants, level_trim, speeds_at
+from ftcc.groundside.scenario.trims import disturbances_at, level_trim, speeds_at, times_to_check
 from ftcc.groundside.schema import FaultFields, Plan
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import navigation
@@ -15,7 +15,7 @@ from ftcc.sim.faults import INTERMITTENT, STUCK, WRONG, Fault
 from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["actuator_faults", "check_ends", "check_faults", "fault_texts", "navigation_faults"]
+__all__ = ["actuator_faults", "check_fault_times", "check_faults", "fault_texts", "navigation_faults"]
 
 _KINDS = {"stuck": STUCK, "intermittent": INTERMITTENT}
 _PARTS = {"position": navigation.POSITION, "attitude": navigation.ATTITUDE}
@@ -34,18 +34,18 @@ def _part(fault: FaultFields) -> tuple[int, str | None, str | None]:
     return fault.uav, fault.actuator, fault.navigation
 
 
-def _repairs(plan: Plan) -> list[FaultFields]:
+def _with_repairs(plan: Plan) -> list[FaultFields]:
     """The faults, in order of time, and a repair wherever one ends and no other of the same part begins just then."""
-    begun = {(fault.at, _part(fault)) for fault in plan.faults}
+    beginnings = {(fault.at, _part(fault)) for fault in plan.faults}
     repairs = [
         FaultFields(at=f.until, uav=f.uav, actuator=f.actuator, navigation=f.navigation, kind="ok")
         for f in plan.faults
-        if f.until is not None and (f.until, _part(f)) not in begun
+        if f.until is not None and (f.until, _part(f)) not in beginnings
     ]
     return sorted([*plan.faults, *repairs], key=lambda f: f.at)
 
 
-def check_ends(plan: Plan, findings: Findings) -> None:
+def check_fault_times(plan: Plan, findings: Findings) -> None:
     """Refuse a fault that begins while another one of the same part has not come to its ``until``."""
     for n, fault in enumerate(plan.faults):
         for m, other in enumerate(plan.faults):
@@ -71,7 +71,7 @@ def actuator_faults(plan: Plan, uav: int) -> tuple[Fault, ...]:
             float(_KINDS.get(f.kind, WRONG)),
             **{name: getattr(f, name) for name in ("slew", "period", "duty") if getattr(f, name) is not None},
         )
-        for f in _repairs(plan)
+        for f in _with_repairs(plan)
         if f.uav == uav and f.actuator is not None
     )
 
@@ -88,14 +88,14 @@ def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
             *f.offset,
             *f.rate_offset,
         )
-        for f in _repairs(plan)
+        for f in _with_repairs(plan)
         if f.uav == uav and f.navigation is not None
     )
 
 
 def fault_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
     """Begin and end of each fault as (time, UAV, text)."""
-    return [(fault.at, fault.uav, _fault_text(fault)) for fault in _repairs(plan)]
+    return [(fault.at, fault.uav, _fault_text(fault)) for fault in _with_repairs(plan)]
 
 
 def _fault_text(fault: FaultFields) -> str:
@@ -124,9 +124,9 @@ def check_faults(
             continue
         remaining = 0.0 if fault.kind == "off" else fault.effectiveness
         vehicle = by_uav[fault.uav]
-        later = [f.at for f in _repairs(plan) if _part(f) == _part(fault) and f.at > fault.at]
+        later = [f.at for f in _with_repairs(plan) if _part(f) == _part(fault) and f.at > fault.at]
         low, high = vehicle.limits[SLOT[fault.actuator]]
-        times = instants(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
+        times = times_to_check(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
         for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:
             acting = disturbances_at(vehicle, plant, at)
             steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
@@ -142,7 +142,7 @@ def check_faults(
                 f"allowed is {low:g} to {high:g}"
             )
             if fault.without_trim:
-                findings.warned.append(text)
+                findings.warn(text)
             else:
                 findings.refuse(f"{text} (without_trim = true flies it anyway)")
             break

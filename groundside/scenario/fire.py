@@ -26,7 +26,7 @@ from ftcc.sim.faults import Fault
 from ftcc.sim.plant import CHI, GAMMA, V
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["check_posts", "fire_commands", "fire_texts", "posts"]
+__all__ = ["check_posts", "fire_commands", "fire_references", "fire_texts"]
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def fire_commands(plan: Plan) -> tuple[Command, ...]:
     return tuple(commands)
 
 
-def posts(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int, OwnReference]:
+def fire_references(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int, OwnReference]:
     """Each UAV's own reference."""
     assert plan.fire is not None
     fire = plan.fire
@@ -72,11 +72,11 @@ def posts(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int,
     own = {}
     for uav in followers:
         post = fire.posts[uav]
-        known = Fire(
+        parameters = Fire(
             *fire.spread, fire.age, fire.omega, post.phase, post.north, post.east, post.altitude,
             fire.shift_speed, fire.shift_acceleration,
         )  # fmt: skip
-        own[uav] = OwnReference(start(known, commands), known, commands)
+        own[uav] = OwnReference(start(parameters, commands), parameters, commands)
     return own
 
 
@@ -84,20 +84,20 @@ def fire_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
     """The fire's changes as events: time s, UAV (None: everybody), text."""
     texts: list[tuple[float, int | None, str]] = []
     for event in plan.fire_events:
-        said = (
+        parts = (
             []
             if event.centre is None
             else [f"its centre is at {event.centre[0]:g} m north, {event.centre[1]:g} m east"]
         )
-        said += [] if event.drift is None else [f"it drifts with {event.drift[0]:g}, {event.drift[1]:g} m/s"]
-        texts.append((event.at, None, f"fire: {', '.join(said)}"))
+        parts += [] if event.drift is None else [f"it drifts with {event.drift[0]:g}, {event.drift[1]:g} m/s"]
+        texts.append((event.at, None, f"fire: {', '.join(parts)}"))
         if event.until is not None:
             texts.append((event.until, None, "fire: it drifts as before"))
     return texts
 
 
 @dataclass(frozen=True)
-class _Needed:
+class _Demand:
     """What a post demands over time, before faults."""
 
     t: Array
@@ -109,7 +109,7 @@ class _Needed:
     """By actuator."""
 
 
-def _needed(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float) -> _Needed:
+def _demand_of(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float) -> _Demand:
     rows = int(duration * 1e6) // _GRID_US + 1
     parameters, commands = np.array(own.parameters), np.array(own.commands)
     row = np.array(own.initial, np.float64)
@@ -119,17 +119,19 @@ def _needed(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float
         motion[k] = row
     t = np.arange(rows) * _GRID_US / 1e6
     channels = [name for name, _ in plants.find(vehicle.plant).DISTURBANCES]
-    push = np.zeros((rows, 3))
+    disturbance = np.zeros((rows, 3))
     for d in vehicle.disturbances:
         name = channels[int(d.channel)]
         if name.startswith("b_"):
             since = np.maximum(t - d.time, 0.0)
             grown = 1.0 - np.exp(-d.onset * since) if d.onset > 0.0 else 1.0
             swing = np.sin(d.frequency * since + d.phase) if d.frequency > 0.0 else 1.0
-            push[:, "xyz".index(name[2])] += np.where((t >= d.time) & (t < d.until), d.value * grown * swing, 0.0)
+            disturbance[:, "xyz".index(name[2])] += np.where(
+                (t >= d.time) & (t < d.until), d.value * grown * swing, 0.0
+            )
     v = motion[:, 3:6]
     speed = np.sqrt((v * v).sum(axis=1))
-    wanted = motion[:, 6:9] - push
+    wanted = motion[:, 6:9] - disturbance
     wanted[:, 2] += model.g
     safe = np.maximum(speed, 1e-3)
     along = (wanted * v).sum(axis=1) / safe
@@ -141,10 +143,10 @@ def _needed(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float
         "load_factor": load,
         "bank": np.arctan2(right, wanted[:, 2]),
     }
-    return _Needed(t, motion, speed, inputs)
+    return _Demand(t, motion, speed, inputs)
 
 
-def _faulty(t: Array, faults: Sequence[Fault], slot: int) -> tuple[Array, Array]:
+def _effectiveness_and_bias(t: Array, faults: Sequence[Fault], slot: int) -> tuple[Array, Array]:
     """Effectiveness and bias of an actuator over time, as its latest fault has them."""
     effectiveness, bias = np.ones_like(t), np.zeros_like(t)
     for fault in sorted(faults):
@@ -171,67 +173,67 @@ def check_posts(
     ``laws`` are the limits of each UAV's own law, by actuator; of two limits the tighter one holds.
     """
     assert plan.fire is not None
-    found = {v.uav: _needed(references[v.uav], v, model, plan.duration) for v in vehicles}
+    found = {v.uav: _demand_of(references[v.uav], v, model, plan.duration) for v in vehicles}
     _check_distances(plan.fire.least_distance, found, findings)
-    refuse = findings.warned.append if plan.fire.beyond_limits else findings.refuse
+    refuse = findings.warn if plan.fire.beyond_limits else findings.refuse
     for vehicle in vehicles:
-        needed = found[vehicle.uav]
-        slowest = float(needed.speed.min())
+        demand = found[vehicle.uav]
+        slowest = float(demand.speed.min())
         if slowest <= vehicle.guards.least_airspeed:
             refuse(
                 f"fire.posts.{vehicle.uav}: demands a speed of {slowest:.1f} m/s; must exceed the lowest airspeed, "
                 f"{vehicle.guards.least_airspeed:g} m/s"
             )
-        for actuator, demanded in needed.inputs.items():
+        for actuator, values in demand.inputs.items():
             law = laws[vehicle.uav].get(actuator, (-math.inf, math.inf))
-            _check_actuator(vehicle, actuator, law, demanded, needed, refuse, findings)
-        _check_start(vehicle, needed, findings)
+            _check_actuator(vehicle, actuator, law, values, demand, refuse, findings)
+        _check_start(vehicle, demand, findings)
 
 
 def _check_actuator(
     vehicle: VehicleSpec,
     actuator: str,
     law: tuple[float, float],
-    demanded: Array,
-    needed: _Needed,
+    values: Array,
+    demand: _Demand,
     refuse: Any,
     findings: Findings,
 ) -> None:
     slot, unit = SLOT[actuator], "" if unit_of(actuator) == "-" else f" {unit_of(actuator)}"
     low, high = max(vehicle.limits[slot][0], law[0]), min(vehicle.limits[slot][1], law[1])
     whose = "plant" if (low, high) == vehicle.limits[slot] else "law"
-    effectiveness, bias = _faulty(needed.t, vehicle.faults, slot)
+    effectiveness, bias = _effectiveness_and_bias(demand.t, vehicle.faults, slot)
     if effectiveness.min() <= 0.0:
-        findings.warned.append(f"UAV {vehicle.uav}: {actuator} loses all effectiveness")
+        findings.warn(f"UAV {vehicle.uav}: {actuator} loses all effectiveness")
         return
-    command = (demanded - bias) / effectiveness
+    command = (values - bias) / effectiveness
     for worst, limit in ((int(command.argmin()), low), (int(command.argmax()), high)):
         value, scale, shift = command[worst], effectiveness[worst], bias[worst]
-        at = f"at t = {needed.t[worst]:g} s and {needed.speed[worst]:.1f} m/s"
-        text = f"fire.posts.{vehicle.uav}: demands {demanded[worst]:.3g}{unit} of {actuator} {at}"
+        at = f"at t = {demand.t[worst]:g} s and {demand.speed[worst]:.1f} m/s"
+        text = f"fire.posts.{vehicle.uav}: demands {values[worst]:.3g}{unit} of {actuator} {at}"
         if scale < 1.0 or shift != 0.0:
-            text += f", the command ({demanded[worst]:.3g} - {shift:.3g})/{scale:.3g} = {value:.3g}{unit}"
+            text += f", the command ({values[worst]:.3g} - {shift:.3g})/{scale:.3g} = {value:.3g}{unit}"
         if not low < value < high:
             refuse(f"{text}; the {whose} allows {low:g} to {high:g}{unit} (fire.beyond_limits = true flies it anyway)")
         elif abs(value - limit) < _NARROW * (high - low):
-            findings.warned.append(f"{text}; close to its limit, {limit:g}{unit}")
+            findings.warn(f"{text}; close to its limit, {limit:g}{unit}")
 
 
-def _check_start(vehicle: VehicleSpec, needed: _Needed, findings: Findings) -> None:
+def _check_start(vehicle: VehicleSpec, demand: _Demand, findings: Findings) -> None:
     true = truth_at_start(vehicle)
-    away = float(np.linalg.norm(true[:3] - needed.motion[0, :3]))
+    away = float(np.linalg.norm(true[:3] - demand.motion[0, :3]))
     if away > _FAR:
-        findings.warned.append(
+        findings.warn(
             f"start of UAV {vehicle.uav}: {away:.0f} m from its post; starts up to {_FAR:g} m away were tested"
         )
     ground = true[V] * math.cos(true[GAMMA])
     own = np.array([ground * math.cos(true[CHI]), ground * math.sin(true[CHI]), true[V] * math.sin(true[GAMMA])])
-    off = float(np.linalg.norm(own - needed.motion[0, 3:6]))
-    if off > 0.5 * needed.speed[0]:
-        findings.warned.append(f"start of UAV {vehicle.uav}: its velocity is {off:.1f} m/s off that of its post")
+    off = float(np.linalg.norm(own - demand.motion[0, 3:6]))
+    if off > 0.5 * demand.speed[0]:
+        findings.warn(f"start of UAV {vehicle.uav}: its velocity is {off:.1f} m/s off that of its post")
 
 
-def _check_distances(least: float, found: Mapping[int, _Needed], findings: Findings) -> None:
+def _check_distances(least: float, found: Mapping[int, _Demand], findings: Findings) -> None:
     uavs = list(found)
     for n, i in enumerate(uavs):
         for j in uavs[n + 1 :]:

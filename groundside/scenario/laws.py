@@ -20,10 +20,10 @@ from ftcc.link.timing import Timing
 from ftcc.sim.plant import ALPHA, BETA, GAMMA, MU, V, X, Z
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["briefings", "check_scheme", "followed_by_gains", "gains_of"]
+__all__ = ["check_scheme", "gains_of", "initial_shared_values", "mission_values_for_gains"]
 
 
-def followed_by_gains(plan: Plan) -> dict[str, float]:
+def mission_values_for_gains(plan: Plan) -> dict[str, float]:
     """What of the mission gains follow unless they are given, see ``airside.scheme.FOLLOWED``."""
     if not plan.leaders:
         return {}
@@ -38,7 +38,7 @@ def gains_of(
     ``switches`` are the scenario's unless given. Empty if they are refused.
     """
     plan = scenario.plan
-    followed = followed_by_gains(plan)
+    followed = mission_values_for_gains(plan)
     switched: dict[str, float] = {}
     for name, on in (plan.switches if switches is None else switches).items():
         if name not in scheme.switches:
@@ -105,11 +105,11 @@ def check_scheme(
         if problem.fatal:
             findings.refuse(who + problem.text)
         else:
-            findings.warned.append(who + problem.text)
+            findings.warn(who + problem.text)
     return flight
 
 
-def briefings(
+def initial_shared_values(
     scheme: Scheme, vehicles: Iterable[VehicleSpec], profiles: Mapping[int, Profile]
 ) -> dict[int, tuple[float, ...]]:
     """What each UAV's hearers know of it before they hear it, by id: its shared values at t = 0, accelerations as 0."""

@@ -23,7 +23,7 @@ from ftcc.link.graph import Graph
 from ftcc.sim.airframe import Airframe
 from ftcc.sim.trim import TrimError, steady_climb
 
-__all__ = ["check_clearance", "limited", "profiles_of"]
+__all__ = ["check_clearance", "limit_climb_rates", "profiles_of"]
 
 _OF_THRUST = 0.99
 """Share of the climb rate that the thrust can hold; the profile of chapter 6 uses nearly all of it."""
@@ -54,7 +54,7 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
         elif command.x is not None:
             triggers.append(Trigger(uav if command.uav is None else command.uav, command.x, altitude, speed))
     if fields.over_obstacles:
-        triggers = _reaction(plan, uav)
+        triggers = _triggers_over_obstacles(plan, uav)
     if commands != sorted(commands, key=lambda c: c.at):
         findings.refuse(f"leaders.{uav}.commands: must be in order of time, each after the until of those before")
     profile = Profile(
@@ -79,7 +79,7 @@ def _profile(plan: Plan, uav: int, graph: Graph, findings: Findings) -> Profile:
     return profile
 
 
-def limited(
+def limit_climb_rates(
     plan: Plan,
     profiles: Mapping[int, Profile],
     sheet: AirframeSheet | PointMassSheet,
@@ -111,27 +111,31 @@ def limited(
     return {
         uav: replace(
             profile,
-            climb_limit=_limit(uav, "climb", profile.climb_limit, flown[uav][1], max(climb, 0.0), estimates, findings),
-            sink_limit=_limit(uav, "sink", profile.sink_limit, flown[uav][0], max(-sink, 0.0), estimates, findings),
+            climb_limit=_limit_in_force(
+                uav, "climb", profile.climb_limit, flown[uav][1], max(climb, 0.0), estimates, findings
+            ),
+            sink_limit=_limit_in_force(
+                uav, "sink", profile.sink_limit, flown[uav][0], max(-sink, 0.0), estimates, findings
+            ),
         )
         for uav, profile in profiles.items()
     }
 
 
-def _limit(
-    uav: int, way: str, stated: float, flown: float, thrust: float, estimates: float, findings: Findings
+def _limit_in_force(
+    uav: int, way: str, given: float, flown: float, thrust: float, estimates: float, findings: Findings
 ) -> float:
-    """The limit in force of one way, "climb" or "sink", m/s; ``stated`` is inf where the scenario says nothing."""
-    told = f"leaders.{uav}: its profile {way}s with {flown:.2f} m/s; the followers' thrust holds {thrust:.2f} m/s"
+    """The limit in force of one way, "climb" or "sink", m/s; ``given`` is inf where the scenario says nothing."""
+    text = f"leaders.{uav}: its profile {way}s with {flown:.2f} m/s; the followers' thrust holds {thrust:.2f} m/s"
     if math.isfinite(estimates):
-        told += f", their estimates follow {estimates:g} m/s"
-    if math.isfinite(stated):
+        text += f", their estimates follow {estimates:g} m/s"
+    if math.isfinite(given):
         if flown > thrust:
-            findings.warned.append(f"{told}: they will lose the leaders")
-        return stated
+            findings.warn(f"{text}: they will lose the leaders")
+        return given
     limit = min(_OF_THRUST * thrust, _OF_ESTIMATES * estimates)
     if flown > limit:
-        findings.warned.append(f"{told}: it is held at {limit:.2f} m/s ({way}_limit changes this)")
+        findings.warn(f"{text}: it is held at {limit:.2f} m/s ({way}_limit changes this)")
     return limit
 
 
@@ -144,7 +148,7 @@ def check_clearance(plan: Plan, profiles: Mapping[int, Profile], findings: Findi
         for n, obstacle in enumerate(plan.obstacles):
             over = z[(x > obstacle.x[0]) & (x < obstacle.x[1])]
             if len(over) and over.min() < obstacle.top:
-                findings.warned.append(
+                findings.warn(
                     f"leaders.{uav}: its profile passes obstacle {n + 1} down to {obstacle.top - over.min():.1f} m "
                     f"below its top"
                 )
@@ -165,7 +169,7 @@ def _check_reactions(plan: Plan, findings: Findings) -> None:
         findings.refuse("leaders: all that climb over obstacles must fly at the same speed")
 
 
-def _reaction(plan: Plan, uav: int) -> list[Trigger]:
+def _triggers_over_obstacles(plan: Plan, uav: int) -> list[Trigger]:
     """The commands by position of a leader that climbs over the obstacles.
 
     The foremost leader detects an obstacle, the hindmost is the last to leave it behind, and all act on both.
@@ -176,8 +180,8 @@ def _reaction(plan: Plan, uav: int) -> list[Trigger]:
     assert plan.detection_range is not None
     changes = []
     for obstacle, altitude in zip(plan.obstacles, own.over_obstacles, strict=True):
-        seen, passed = obstacle.x[0] - plan.detection_range, obstacle.x[1]
-        changes.append((seen - leaders[first].x, first, seen, altitude, True))
+        detected, passed = obstacle.x[0] - plan.detection_range, obstacle.x[1]
+        changes.append((detected - leaders[first].x, first, detected, altitude, True))
         changes.append((passed - leaders[last].x, last, passed, altitude, False))
     triggers, ahead = [], []
     for _, watched, x, altitude, begins in sorted(changes):

@@ -33,11 +33,11 @@ from ftcc.groundside.scenario.checks import (
     scheme_of,
     timing_of,
 )
-from ftcc.groundside.scenario.columns import leading
-from ftcc.groundside.scenario.faults import check_ends, check_faults
+from ftcc.groundside.scenario.columns import leading_columns
+from ftcc.groundside.scenario.faults import check_fault_times, check_faults
 from ftcc.groundside.scenario.fire import check_posts
-from ftcc.groundside.scenario.laws import briefings, check_scheme, gains_of
-from ftcc.groundside.scenario.leaders import check_clearance, limited, profiles_of
+from ftcc.groundside.scenario.laws import check_scheme, gains_of, initial_shared_values
+from ftcc.groundside.scenario.leaders import check_clearance, limit_climb_rates, profiles_of
 from ftcc.groundside.scenario.links import link_changes
 from ftcc.groundside.scenario.loading import Scenario, load_airframe
 from ftcc.groundside.scenario.references import own_references
@@ -138,15 +138,15 @@ def resolve(scenario: Scenario) -> Mission:
     )
     findings.stop_if_refused()
     gains = gains_of(scenario, basis.scheme, findings)
-    _check_that_it_can_be_flown(plan, basis, vehicles, profiles, references, gains, model, findings)
+    _check_flyable(plan, basis, vehicles, profiles, references, gains, model, findings)
     flight = None
     if gains:
-        flight, profiles = _guided(plan, basis, vehicles, profiles, references, gains, findings)
+        flight, profiles = _prepare_guidance(plan, basis, vehicles, profiles, references, gains, findings)
     tolerant = _tolerant_gains(scenario, basis.scheme, gains, findings)
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, basis.graph, channel, findings.refuse)
     check_delays(plan, basis.timing, findings)
-    _check_what_is_recorded(plan, basis, findings)
+    _check_recorded_columns(plan, basis, findings)
     findings.stop_if_refused()
 
     autopilots = _autopilots(
@@ -194,7 +194,7 @@ def _basis(scenario: Scenario, findings: Findings) -> _Basis:
     wire = scenario.form != IDEAL
     timing = timing_of(plan, wire, findings)
     plant = plant_of(plan, scheme, findings)
-    check_ends(plan, findings)
+    check_fault_times(plan, findings)
     check_wind(plan, plant, findings)
     limits = limits_of(plan, plant, findings)
     graph = graph_of(plan, scheme, findings)
@@ -204,7 +204,7 @@ def _basis(scenario: Scenario, findings: Findings) -> _Basis:
     return _Basis(scheme, wire, timing, plant, limits, graph, sheet, airframe)
 
 
-def _check_that_it_can_be_flown(
+def _check_flyable(
     plan: Plan,
     basis: _Basis,
     vehicles: list[VehicleSpec],
@@ -226,7 +226,7 @@ def _check_that_it_can_be_flown(
         findings.refuse(f"faults: form {IDEAL} has no navigation solution that could fail")
 
 
-def _guided(
+def _prepare_guidance(
     plan: Plan,
     basis: _Basis,
     vehicles: list[VehicleSpec],
@@ -240,7 +240,7 @@ def _guided(
         plan, basis.scheme, gains, basis.graph, basis.timing, vehicles, profiles, references, findings
     )
     estimates = min(basis.scheme.climb_limit(gains[uav]) for uav in basis.graph.followers)
-    profiles = limited(plan, profiles, basis.sheet, basis.limits[THRUST], estimates, findings)
+    profiles = limit_climb_rates(plan, profiles, basis.sheet, basis.limits[THRUST], estimates, findings)
     check_clearance(plan, profiles, findings)
     return flight, profiles
 
@@ -255,11 +255,11 @@ def _tolerant_gains(
     return gains_of(scenario, scheme, findings, switches | {FAULT_TOLERANCE: True})
 
 
-def _check_what_is_recorded(plan: Plan, basis: _Basis, findings: Findings) -> None:
+def _check_recorded_columns(plan: Plan, basis: _Basis, findings: Findings) -> None:
     """Claims and tracking errors must speak of recorded columns."""
     clearance = ["clearance"] if plan.obstacles else []
     signals = (quantity.name for quantity in basis.scheme.signals)
-    names = (*leading(basis.plant.ACTUATORS), *clearance, *signals)
+    names = (*leading_columns(basis.plant.ACTUATORS), *clearance, *signals)
     findings.refused += check_claims(plan.claims, basis.graph, names)
     check_tracking(basis.scheme, names, findings)
 
@@ -279,7 +279,7 @@ def _autopilots(
 ) -> tuple[AutopilotSpec, ...]:
     """The spec of each vehicle's autopilot."""
     graph, scheme = basis.graph, basis.scheme
-    briefed = briefings(scheme, vehicles, profiles)
+    initial = initial_shared_values(scheme, vehicles, profiles)
     # Laws for the vertical plane fly north.
     steered = scheme.plant == "longitudinal" and "aileron" in basis.plant.ACTUATORS
     return tuple(
@@ -295,7 +295,7 @@ def _autopilots(
             travel=vehicle.travel,
             reference=references[vehicle.uav],
             neighbours=tuple(
-                Neighbour(j, graph.weights[vehicle.uav, j], briefed.get(j, ())) for j in graph.senders(vehicle.uav)
+                Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)
             ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),

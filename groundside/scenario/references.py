@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ftcc.airside.references import attitude, longitudinal
 from ftcc.airside.spec import OwnReference
 from ftcc.groundside.scenario.checks import Findings
-from ftcc.groundside.scenario.fire import fire_texts, posts
+from ftcc.groundside.scenario.fire import fire_references, fire_texts
 from ftcc.groundside.schema import Plan
 from ftcc.link.timing import Timing
 
@@ -37,7 +37,7 @@ def own_references(
         constants = longitudinal.Reference(x=0.0, V=V, V_dot=0.0, z=0.0, z_dot=0.0, z_ddot=0.0, x_dot=V)
         return dict.fromkeys([*followers, *plan.leaders], OwnReference(constants))
     if plant == "position":
-        return posts(plan, followers, findings)
+        return fire_references(plan, followers, findings)
     return {uav: _attitude(plan, uav, timing, findings) for uav in followers}
 
 

@@ -19,14 +19,14 @@ PlannedEvent = tuple[float, int | None, str, str]
 def planned_events(plan: Plan, plant: ModuleType) -> tuple[PlannedEvent, ...]:
     """In the order of time."""
     commands = [*_leader_texts(plan), *reference_texts(plan)]
-    mishaps = [
+    warnings = [
         *fault_texts(plan),
         *_disturbance_texts(plan, plant),
         *link_texts(plan.link_events),
         *wind_texts(plan),
     ]
     events = [(t, uav, "info", text) for t, uav, text in commands]
-    events += [(t, uav, "warning", text) for t, uav, text in mishaps]
+    events += [(t, uav, "warning", text) for t, uav, text in warnings]
     end = plan.duration + 1e-9
     return tuple(sorted((event for event in events if event[0] <= end), key=lambda e: (e[0], e[1] or 0, e[3])))
 

@@ -19,7 +19,15 @@ from ftcc.sim.plant import AIRSPEED, CLIMB, INCIDENCE, LOST, SIDESLIP, TRUTH, UN
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.trim import TrimError
 
-__all__ = ["check_starts", "check_trims", "disturbances_at", "instants", "level_trim", "speeds_at", "truth_at_start"]
+__all__ = [
+    "check_starts",
+    "check_trims",
+    "disturbances_at",
+    "level_trim",
+    "speeds_at",
+    "times_to_check",
+    "truth_at_start",
+]
 
 _GUARDED = {
     AIRSPEED: ("V", "least_airspeed"),
@@ -75,7 +83,9 @@ def speeds_at(plan: Plan, profiles: dict[int, Profile], uav: int, at: float) -> 
     return {own.V or plan.start.V or math.nan}
 
 
-def instants(plan: Plan, profiles: dict[int, Profile], vehicle: VehicleSpec, begin: float, end: float) -> list[float]:
+def times_to_check(
+    plan: Plan, profiles: dict[int, Profile], vehicle: VehicleSpec, begin: float, end: float
+) -> list[float]:
     """``begin`` and the later times before ``end`` (s) at which another level flight is asked of a vehicle."""
     times = {command.at for p in profiles.values() for command in p.commands}
     times |= {time for disturbance in vehicle.disturbances for time in (disturbance.time, disturbance.until)}
@@ -109,21 +119,21 @@ def check_trims(
     plan: Plan, plant: ModuleType, vehicles: Iterable[VehicleSpec], profiles: dict[int, Profile], findings: Findings
 ) -> None:
     """Refuse a healthy aircraft that cannot fly level within its travel: at its start, under each disturbance."""
-    tell = findings.warned.append if plan.plant.beyond_limits else findings.refuse
-    without: dict[str, list[int]] = {}
+    report = findings.warn if plan.plant.beyond_limits else findings.refuse
+    problems: dict[str, list[int]] = {}
     for vehicle in vehicles:
-        text = _beyond_travel(plan, plant, vehicle, profiles, findings) if vehicle.kind == "aircraft" else ""
+        text = _first_beyond_travel(plan, plant, vehicle, profiles, findings) if vehicle.kind == "aircraft" else ""
         if text:
-            without.setdefault(text, []).append(vehicle.uav)
-    for text, uavs in without.items():
-        tell(f"UAV {', '.join(map(str, uavs))}: {text} (plant.beyond_limits = true flies it anyway)")
+            problems.setdefault(text, []).append(vehicle.uav)
+    for text, uavs in problems.items():
+        report(f"UAV {', '.join(map(str, uavs))}: {text} (plant.beyond_limits = true flies it anyway)")
 
 
-def _beyond_travel(
+def _first_beyond_travel(
     plan: Plan, plant: ModuleType, vehicle: VehicleSpec, profiles: dict[int, Profile], findings: Findings
 ) -> str:
     """What a healthy aircraft would first need beyond its travel; empty if it can always fly level."""
-    for at in instants(plan, profiles, vehicle, 0.0, math.inf):
+    for at in times_to_check(plan, profiles, vehicle, 0.0, math.inf):
         for speed in sorted(speeds_at(plan, profiles, vehicle.uav, at)):
             where = f"UAV {vehicle.uav} at t = {at:g} s"
             acting = disturbances_at(vehicle, plant, at)

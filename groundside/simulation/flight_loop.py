@@ -182,7 +182,7 @@ def fly_ticks(world, timing, wire, first, last):
         else:
             _ideal_tick(world, timing, n)
         _record(world, timing, n)
-        _fly_on(world, timing, n)
+        _advance_vehicles(world, timing, n)
 
 
 @compiled
@@ -192,14 +192,14 @@ def _tick_by_wire(world, timing, n):
     for i in range(lost.shape[0]):
         if lost[i] == 0:
             if n > 0:
-                _bring_into_force(world, i)
+                _apply_last_command(world, i)
             _state_of(world.fleet, i, n, now, timing.seed, world.true[i], world.measured, world.state, world.controls)
             _sense(autopilots, i, world.state, world.controls, now)
     for i in range(lost.shape[0]):
         if lost[i] == 0:
             _hear(world.exchange, inbox, world.events, timing, i, now)
             _refer(autopilots, inbox, i, now, timing.period_us)
-            _obey(world, timing, i, now)
+            _control_follower(world, timing, i, now)
     if now % timing.exchange_us == 0:
         for i in range(lost.shape[0]):
             if lost[i] == 0:
@@ -234,11 +234,11 @@ def _ideal_tick(world, timing, n):
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
                 _hear(world.exchange, inbox, world.events, timing, i, now)
-        _settle(world, now, timing.period_us / 1e6)
+        _settle_exchange(world, now, timing.period_us / 1e6)
     for i in range(lost.shape[0]):
         if lost[i] == 0 and autopilots.leader[i] == 0:
             _hear(world.exchange, inbox, world.events, timing, i, now)
-            _obey(world, timing, i, now)
+            _control_follower(world, timing, i, now)
     for i in range(lost.shape[0]):
         if _flies(world.recording, i, now):
             if autopilots.leader[i] == 1:
@@ -255,7 +255,7 @@ def _flies(recording, i, now):
 
 
 @compiled
-def _bring_into_force(world, i):
+def _apply_last_command(world, i):
     """The last command, as a message carries it."""
     fleet, autopilots = world.fleet, world.autopilots
     if autopilots.leader[i] == 1:
@@ -274,7 +274,7 @@ def _bring_into_force(world, i):
 
 
 @compiled
-def _obey(world, timing, i, now):
+def _control_follower(world, timing, i, now):
     """The law of a follower; where its command is not finite the UAV is lost."""
     if world.autopilots.leader[i] == 1:
         return
@@ -285,7 +285,7 @@ def _obey(world, timing, i, now):
 
 
 @compiled
-def _settle(world, now, dt):
+def _settle_exchange(world, now, dt):
     """Repeat the ideal exchange of this instant until the shared values have settled, all at once each time.
 
     For a law whose shared values depend on what it hears of the same instant: an algebraic loop around the graph.
@@ -329,7 +329,7 @@ def _record(world, timing, n):
 
 
 @compiled
-def _fly_on(world, timing, n):
+def _advance_vehicles(world, timing, n):
     """Fly the vehicles for one period; one that leaves its model is lost."""
     now, recording = n * timing.period_us, world.recording
     for i in range(recording.lost.shape[0]):

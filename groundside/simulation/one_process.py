@@ -151,8 +151,8 @@ class Flight:
             "sender": np.tile(np.array([edge[3] for edge in edges], np.int32), len(times)),
         }
         table |= {name: rows[:, n] for n, name in enumerate(LINK_REPORT)}
-        told = np.isfinite(table["sent"])
-        return {name: column[told] for name, column in table.items()}
+        reported = np.isfinite(table["sent"])
+        return {name: column[reported] for name, column in table.items()}
 
     def table(self) -> dict[str, NDArray[Any]]:
         """All columns, a row per recorded tick and UAV, by time, then UAV."""
@@ -167,7 +167,7 @@ class Flight:
         return table
 
 
-def _size(mission: Mission) -> tuple[int, float]:
+def _recording_size(mission: Mission) -> tuple[int, float]:
     """Rows of each UAV, and the GB that all of them take."""
     timing, uavs = mission.timing, len(mission.uavs)
     rows = timing.ticks // timing.record_every + 1
@@ -175,10 +175,10 @@ def _size(mission: Mission) -> tuple[int, float]:
     return rows, 8 * rows * uavs * columns / 1e9
 
 
-def _require(mission: Mission, needed: float, free: float, of: str) -> None:
+def _require_space(mission: Mission, needed: float, free: float, of: str) -> None:
     """Refuse a flight whose recording takes more GB than are free."""
     if needed > free:
-        what = f"{_size(mission)[0]} rows of {len(mission.uavs)} UAVs"
+        what = f"{_recording_size(mission)[0]} rows of {len(mission.uavs)} UAVs"
         raise TooLargeError(
             f"duration = {mission.timing.duration:g}: {what} take {needed:.1f} GB of {of}, {free:.1f} GB are free; "
             "shorten the flight, or lower record_rate"
@@ -215,7 +215,7 @@ def fly_in_memory(
         If the recording does not fit into memory.
     """
     # What is made of it takes as much again.
-    _require(mission, 2 * _size(mission)[1], psutil.virtual_memory().available / 1e9, "memory")
+    _require_space(mission, 2 * _recording_size(mission)[1], psutil.virtual_memory().available / 1e9, "memory")
     return _fly(mission, mission.timing.ticks + 1, lambda _: None, progress, ready)
 
 
@@ -243,24 +243,24 @@ def _fly(
     while flown < end and not interrupted:
         try:
             if flown == taken + room:
-                with _ctrl_c_waits():
-                    take(_part(mission, world.recording, taken, flown, events))
+                with _defer_interrupt():
+                    take(_flight_so_far(mission, world.recording, taken, flown, events))
                     taken = flown
                     world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
             until = min(end, flown + chunk, taken + room)
             loop.fly_ticks(world, timing, mission.wire, flown, until)
-            events += _happened(mission, world.fleet, world.autopilots)
+            events += _drain_all_events(mission, world.fleet, world.autopilots)
             flown = until
             if progress is not None:
                 progress((flown - 1) * timing.period)
         except KeyboardInterrupt:
             # What has been flown is recorded; a shorter flight than was asked for is not hidden.
             interrupted = True
-    return _part(mission, world.recording, taken, flown, events)
+    return _flight_so_far(mission, world.recording, taken, flown, events)
 
 
 @contextlib.contextmanager
-def _ctrl_c_waits() -> Iterator[None]:
+def _defer_interrupt() -> Iterator[None]:
     """Ctrl-C that comes meanwhile is heard afterwards: no block is written by half. It only reaches the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -275,7 +275,9 @@ def _ctrl_c_waits() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _part(mission: Mission, recording: Any, begin: int, end: int, events: list[tuple[float, int, str, str]]) -> Flight:
+def _flight_so_far(
+    mission: Mission, recording: Any, begin: int, end: int, events: list[tuple[float, int, str, str]]
+) -> Flight:
     """What ticks ``begin`` .. ``end`` - 1 have recorded, and what has happened up to then."""
     timing = mission.timing
     row, report = (int(first) for first in recording.first)
@@ -300,7 +302,7 @@ def _part(mission: Mission, recording: Any, begin: int, end: int, events: list[t
     )
 
 
-def _happened(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:
+def _drain_all_events(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:
     """What vehicles and autopilots have noted: time s, UAV, severity, text."""
     entries = [(at, mission.uavs[i], number) for at, i, _, number in drain_events(fleet.events)]
     events = [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in entries]
@@ -326,7 +328,9 @@ def simulate(
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    _require(mission, _LEAST_SHARE * _size(mission)[1], psutil.disk_usage(str(folder)).free / 1e9, "disk at least")
+    _require_space(
+        mission, _LEAST_SHARE * _recording_size(mission)[1], psutil.disk_usage(str(folder)).free / 1e9, "disk at least"
+    )
     timing = mission.timing
     columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
     last = 0.0
@@ -343,12 +347,12 @@ def simulate(
 
         room = min(timing.ticks + 1, max(1, _BLOCK // len(mission.uavs)) * timing.record_every)
         rest = _fly(mission, room, take, progress, ready)
-        with contextlib.suppress(KeyboardInterrupt), _ctrl_c_waits():
+        with contextlib.suppress(KeyboardInterrupt), _defer_interrupt():
             take(rest)
-    return _concluded(mission, folder, last, rest)
+    return _conclude(mission, folder, last, rest)
 
 
-def _concluded(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
+def _conclude(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
     """The run of a flight whose signals up to ``last`` (s) are in ``folder``: with scenario, events and verdict."""
     (folder / "scenario.toml").write_text(mission.toml_of_run(time.time()), encoding="utf-8")
     events = EventLog(folder / "events.jsonl")

@@ -4,4 +4,4 @@ from .verdict import FAILED as FAILED
 from .verdict import REMARKS as REMARKS
 from .verdict import VERDICT_FILE as VERDICT_FILE
 from .verdict import Verdict as Verdict
-from .verdict import size as size
+from .verdict import with_unit as with_unit

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.claims import Signals, evaluated, names_in
-from ftcc.groundside.verdict.oscillation import is_driven, oscillation
+from ftcc.groundside.claims import Signals, evaluate_expression, names_in
+from ftcc.groundside.verdict.oscillation import is_forced, oscillation
 from ftcc.groundside.verdict.verdict import LimitCycle, Loss, Outside, Saturation, TrackingError, Verdict
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim.plants import conditions_of, find
@@ -88,7 +88,7 @@ class _Flight:
         self.until = {uav: float(t[-1]) for uav in signals.uavs if len(t := signals.column("t", uav))}
         """When the recording of a UAV ends, s."""
         self.end = max(self.until.values(), default=0.0)
-        self.closing = self.end - min(max(END * self.end, LEAST_END), self.end / 2.0) - _CLOSE
+        self.end_begins = self.end - min(max(END * self.end, LEAST_END), self.end / 2.0) - _CLOSE
         """When the end begins, s."""
         self.followers = [uav for uav in self.graph.followers if uav in self.until]
 
@@ -100,17 +100,17 @@ class _Flight:
         """Whether a UAV flew to the end."""
         return uav not in self.lost and self.until.get(uav, -1.0) >= self.end - _TOGETHER
 
-    def of(self, expression: str, uav: int) -> Array:
+    def values(self, expression: str, uav: int) -> Array:
         """An expression at all times of a UAV."""
         found = self._values.get((expression, uav))
         if found is None:
-            found = evaluated(expression, self.signals, self.graph, uav)
+            found = evaluate_expression(expression, self.signals, self.graph, uav)
             if found.nbytes <= self._room:
                 self._room -= found.nbytes
                 self._values[expression, uav] = found
         return found
 
-    def has(self, expression: str) -> bool:
+    def can_evaluate(self, expression: str) -> bool:
         """Whether the recording can say it: places between leaders need leaders that reach everybody."""
         names = names_in(expression)
         places = names & (set(_HULLS) | {name for name, _ in _HULLS.values()})
@@ -129,19 +129,19 @@ def _losses(flight: _Flight) -> Iterator[Loss]:
 def _tracking(flight: _Flight) -> Iterator[TrackingError]:
     """Every tracking error that the scheme declares."""
     for error in flight.mission.scheme.tracking:
-        if not flight.has(error.name):
+        if not flight.can_evaluate(error.name):
             continue
         largest, end = (-1.0, 0, 0.0), (-1.0, 0)
         too_large = False
         for uav in flight.followers:
             t = flight.times(uav)
-            x = np.abs(flight.of(error.name, uav))
+            x = np.abs(flight.values(error.name, uav))
             there = np.flatnonzero(np.isfinite(x))
             if not len(there):
                 continue
             worst = there[int(np.argmax(x[there]))]
             largest = max(largest, (float(x[worst]), uav, float(t[worst])), key=lambda one: one[0])
-            late = there[t[there] >= flight.closing]
+            late = there[t[there] >= flight.end_begins]
             if flight.lasted(uav) and len(late):
                 end = max(end, (float(x[late].max()), uav), key=lambda one: one[0])
                 allowed = _allowed(flight, error.bound, error.unit, uav)
@@ -157,7 +157,7 @@ def _tracking(flight: _Flight) -> Iterator[TrackingError]:
 
 def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) -> Array | float | None:
     if isinstance(bound, str):
-        return np.abs(flight.of(bound, uav))
+        return np.abs(flight.values(bound, uav))
     return bound if bound is not None else ALLOWED.get(unit)
 
 
@@ -165,28 +165,28 @@ def _outside(flight: _Flight) -> Iterator[Outside]:
     """Bounds of signals, and the leaders' hull, that a UAV left."""
     for signal in flight.mission.scheme.signals:
         for uav in flight.followers if signal.bound is not None else ():
-            bound = np.abs(flight.of(str(signal.bound), uav))
-            beyond = np.abs(flight.of(signal.name, uav)) > bound
+            bound = np.abs(flight.values(str(signal.bound), uav))
+            beyond = np.abs(flight.values(signal.name, uav)) > bound
             name = f"bound {signal.bound} of {signal.name}"
-            yield from _left(flight, name, signal.meaning, uav, beyond)
+            yield from _times_outside(flight, name, signal.meaning, uav, beyond)
     if len(flight.graph.leaders) < 2:
         return
     tracked = frozenset[str]().union(*(names_in(error.name) for error in flight.mission.scheme.tracking))
     for place, (distance, name) in _HULLS.items():
         asked = place in tracked or place == "z_d"
-        for uav in flight.followers if asked and flight.has(distance) else ():
-            away = flight.of(distance, uav)
+        for uav in flight.followers if asked and flight.can_evaluate(distance) else ():
+            away = flight.values(distance, uav)
             inside = away <= HULL
-            entered = np.logical_or.accumulate(inside) | ~inside.any()
-            beyond = entered & (away > HULL)
-            yield from _left(flight, name, f"more than {HULL:g} m outside", uav, beyond)
+            was_inside = np.logical_or.accumulate(inside) | ~inside.any()
+            beyond = was_inside & (away > HULL)
+            yield from _times_outside(flight, name, f"more than {HULL:g} m outside", uav, beyond)
 
 
-def _left(flight: _Flight, name: str, meaning: str, uav: int, beyond: NDArray[np.bool_]) -> Iterator[Outside]:
+def _times_outside(flight: _Flight, name: str, meaning: str, uav: int, beyond: NDArray[np.bool_]) -> Iterator[Outside]:
     rows = np.flatnonzero(beyond)
     if len(rows):
         until = float(flight.times(uav)[rows[-1]])
-        at_end = flight.lasted(uav) and until >= flight.closing
+        at_end = flight.lasted(uav) and until >= flight.end_begins
         yield Outside(name, meaning, uav, len(rows) * flight.row, until, at_end)
 
 
@@ -219,14 +219,14 @@ def _saturation(flight: _Flight) -> Iterator[Saturation]:
 
 def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
     """The worst oscillation of each UAV, in shares of what is allowed."""
-    given: list[float] | None = None
+    commanded: list[float] | None = None
     worst: dict[int, tuple[float, LimitCycle]] = {}
     for uav, name, unit, signal, floor in _oscillating(flight):
-        found = oscillation(flight.times(uav), flight.of(signal, uav), floor)
+        found = oscillation(flight.times(uav), flight.values(signal, uav), floor)
         if found is None or (uav in worst and found.amplitude / floor <= worst[uav][0]):
             continue
-        given = _given(flight) if given is None else given
-        if not is_driven(found.frequency, given):
+        commanded = _commanded_frequencies(flight) if commanded is None else commanded
+        if not is_forced(found.frequency, commanded):
             worst[uav] = found.amplitude / floor, LimitCycle(name, unit, uav, *found)
     for uav in flight.followers:
         if uav in worst:
@@ -246,12 +246,12 @@ def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
                 yield uav, name, unit_of(name), f"{name}_command", RIPPLE * actuators[uav][name].travel
     for error in flight.mission.scheme.tracking:
         floor = error.bound if isinstance(error.bound, float) else ALLOWED.get(error.unit)
-        if floor is not None and flight.has(error.name):
+        if floor is not None and flight.can_evaluate(error.name):
             for uav in lasting:
                 yield uav, error.name, error.unit, error.name, floor
 
 
-def _given(flight: _Flight) -> list[float]:
+def _commanded_frequencies(flight: _Flight) -> list[float]:
     """Frequencies that the scenario or the ground commands, rad/s.
 
     Leaders' motion, what UAVs refer to by themselves, and what fails or disturbs in a rhythm, as an intermittent fault

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LEAST_PERIODS", "Oscillation", "is_driven", "oscillation"]
+__all__ = ["LEAST_PERIODS", "Oscillation", "is_forced", "oscillation"]
 
 Array = NDArray[np.float64]
 
@@ -92,6 +92,6 @@ def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
     return Oscillation(2.0 * np.pi * line / (float(t[1] - t[0]) * n), float(np.median(last)))
 
 
-def is_driven(frequency: float, given: Iterable[float]) -> bool:
-    """Whether an oscillation answers one of ``given`` frequencies (rad/s), or is a multiple of it."""
-    return any(abs(frequency - n * one) <= WIDTH * frequency for one in given for n in _HARMONICS)
+def is_forced(frequency: float, commanded: Iterable[float]) -> bool:
+    """Whether an oscillation answers one of ``commanded`` frequencies (rad/s), or is a multiple of it."""
+    return any(abs(frequency - n * one) <= WIDTH * frequency for one in commanded for n in _HARMONICS)

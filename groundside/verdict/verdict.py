@@ -29,7 +29,7 @@ __all__ = [
     "Saturation",
     "TrackingError",
     "Verdict",
-    "size",
+    "with_unit",
 ]
 
 SCHEMA_VERSION = 1
@@ -193,7 +193,7 @@ class Verdict:
         return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
 
 
-def size(value: float | None, unit: str) -> str:
+def with_unit(value: float | None, unit: str) -> str:
     """A number with its unit, angles in degrees; "-" without one."""
     if value is None:
         return "-"
@@ -203,14 +203,16 @@ def size(value: float | None, unit: str) -> str:
 
 
 def _as_text(error: TrackingError) -> str:
-    end = "" if error.end is None else f", {size(error.end, error.unit)} in the end"
-    largest = f"up to {size(error.largest, error.unit)}, UAV {error.uav} at {error.at:.1f} s"
+    end = "" if error.end is None else f", {with_unit(error.end, error.unit)} in the end"
+    largest = f"up to {with_unit(error.largest, error.unit)}, UAV {error.uav} at {error.at:.1f} s"
     return f"{error.meaning} ({error.name}): {largest}{end}"
 
 
 def _too_large(error: TrackingError) -> str:
-    allowed = "" if error.allowed is None else f", {size(error.allowed, error.unit)} allowed"
-    return f"{error.meaning} ({error.name}): {size(error.end, error.unit)} in the end, UAV {error.end_uav}{allowed}"
+    allowed = "" if error.allowed is None else f", {with_unit(error.allowed, error.unit)} allowed"
+    return (
+        f"{error.meaning} ({error.name}): {with_unit(error.end, error.unit)} in the end, UAV {error.end_uav}{allowed}"
+    )
 
 
 def _named(found: Iterable[Any], key: str) -> Iterator[tuple[str, list[Any]]]:
@@ -231,17 +233,17 @@ def _bounds(found: Iterable[Outside], how: str) -> list[str]:
 
 
 def _saturations(found: Iterable[Saturation]) -> list[str]:
-    told = []
+    lines = []
     for name, those in _named(list(found), "actuator"):
         most = f"{100.0 * max(one.share for one in those):.0f} % of the time"
-        told.append(f"{name.replace('_', ' ')} at its limits for up to {most}: {_who(those)}")
-    return told
+        lines.append(f"{name.replace('_', ' ')} at its limits for up to {most}: {_who(those)}")
+    return lines
 
 
 def _limit_cycles(found: Iterable[LimitCycle]) -> list[str]:
-    told = []
+    lines = []
     for name, those in _named(list(found), "signal"):
         worst = max(those, key=lambda one: one.amplitude)
-        what = f"{worst.frequency:.2g} rad/s, up to +-{size(worst.amplitude, worst.unit)}"
-        told.append(f"limit cycle of {name.replace('_', ' ')}, {what}: {_who(those)}")
-    return told
+        what = f"{worst.frequency:.2g} rad/s, up to +-{with_unit(worst.amplitude, worst.unit)}"
+        lines.append(f"limit cycle of {name.replace('_', ' ')}, {what}: {_who(those)}")
+    return lines

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ftcc.groundside.claims.claims import Result, check_claims, evaluate, tolerance_of
-from ftcc.groundside.claims.expressions import check_expression, evaluated
+from ftcc.groundside.claims.expressions import check_expression, evaluate_expression
 from ftcc.groundside.claims.metrics import METRICS
 from ftcc.groundside.schema import Claim
 from ftcc.link.graph import Graph
@@ -71,15 +71,15 @@ def result(known: Known, **fields: Any) -> Result:
 
 
 def test_the_containment_point_is_the_hull_weights_combination_of_the_leaders(known: Known) -> None:
-    np.testing.assert_allclose(evaluated("z_d", known, GRAPH, 1), 1075.0)
-    np.testing.assert_allclose(evaluated("z - z_d", known, GRAPH, 1), np.exp(-T), atol=1e-9)
-    assert evaluated("hull_distance", known, GRAPH, 2)[[0, 99, 100]].tolist() == [5.0, 5.0, 0.0]
+    np.testing.assert_allclose(evaluate_expression("z_d", known, GRAPH, 1), 1075.0)
+    np.testing.assert_allclose(evaluate_expression("z - z_d", known, GRAPH, 1), np.exp(-T), atol=1e-9)
+    assert evaluate_expression("hull_distance", known, GRAPH, 2)[[0, 99, 100]].tolist() == [5.0, 5.0, 0.0]
 
 
 def test_the_same_holds_for_forward_positions(known: Known) -> None:
     known.data |= {("x", 7): 30.0 * T, ("x", 8): 30.0 * T + 100.0, ("x", 2): 30.0 * T - 20.0 * (T < 1.0)}
-    np.testing.assert_allclose(evaluated("x_d", known, GRAPH, 1), 30.0 * T + 25.0)
-    assert evaluated("hull_distance_x", known, GRAPH, 2)[[0, 99, 100]].tolist() == [20.0, 20.0, 0.0]
+    np.testing.assert_allclose(evaluate_expression("x_d", known, GRAPH, 1), 30.0 * T + 25.0)
+    assert evaluate_expression("hull_distance_x", known, GRAPH, 2)[[0, 99, 100]].tolist() == [20.0, 20.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -140,9 +140,9 @@ def test_departure_is_measured_from_the_mean_before(known: Known) -> None:
 
 
 def test_an_expression_may_look_at_another_uav_at_the_same_times(known: Known) -> None:
-    np.testing.assert_allclose(evaluated("z - z[7]", known, GRAPH, 1), np.exp(-T) - 25.0)
+    np.testing.assert_allclose(evaluate_expression("z - z[7]", known, GRAPH, 1), np.exp(-T) - 25.0)
     known.data[("z", 7)] = known.data[("z", 7)][:501]
-    np.testing.assert_array_equal(np.isnan(evaluated("z - z[7]", known, GRAPH, 1)), T > 5.0)
+    np.testing.assert_array_equal(np.isnan(evaluate_expression("z - z[7]", known, GRAPH, 1)), T > 5.0)
     claim = Claim.model_validate(STANDARD | {"signal": "z - z[3]"})
     assert check_claims([claim], GRAPH, ["z"]) == ["claims.0 (claim): uavs 3 do not exist"]
 
@@ -237,18 +237,21 @@ def test_expressions_are_arithmetic_and_nothing_else(expression: str) -> None:
 
 def test_expressions_compute(known: Known) -> None:
     np.testing.assert_allclose(
-        evaluated("max(abs(-x) ** 2 / 4, 0.1) + 1", known, GRAPH, 2), np.maximum(known.column("x", 2) ** 2 / 4, 0.1) + 1
+        evaluate_expression("max(abs(-x) ** 2 / 4, 0.1) + 1", known, GRAPH, 2),
+        np.maximum(known.column("x", 2) ** 2 / 4, 0.1) + 1,
     )
-    assert np.isinf(evaluated("1 / 0", known, GRAPH, 1)).all()
+    assert np.isinf(evaluate_expression("1 / 0", known, GRAPH, 1)).all()
 
 
 def test_swarm_functions_look_at_all_followers_and_at_the_neighbours(known: Known) -> None:
     """x of UAV 2 is twice that of UAV 1; each hears the other with weight 1, and leaders do not count."""
     x = known.column("x", 1)
-    np.testing.assert_allclose(evaluated("total(x ** 2)", known, GRAPH, 2), 5.0 * x**2)
-    np.testing.assert_allclose(evaluated("largest(abs(x))", known, GRAPH, 1), 2.0 * abs(x))
-    np.testing.assert_allclose(evaluated("disagreement(x)", known, GRAPH, 1), -x)
-    np.testing.assert_allclose(evaluated("total(3 * x + disagreement(x))", known, GRAPH, 1), 9.0 * x, atol=1e-12)
+    np.testing.assert_allclose(evaluate_expression("total(x ** 2)", known, GRAPH, 2), 5.0 * x**2)
+    np.testing.assert_allclose(evaluate_expression("largest(abs(x))", known, GRAPH, 1), 2.0 * abs(x))
+    np.testing.assert_allclose(evaluate_expression("disagreement(x)", known, GRAPH, 1), -x)
+    np.testing.assert_allclose(
+        evaluate_expression("total(3 * x + disagreement(x))", known, GRAPH, 1), 9.0 * x, atol=1e-12
+    )
     assert check_claims([Claim.model_validate(STANDARD | {"signal": "total(y)"})], GRAPH, known.names)
     with pytest.raises(ValueError, match="total takes one argument"):
         check_expression("total(x, z)", known.names)
@@ -259,10 +262,10 @@ def test_angles_on_both_sides_of_half_a_turn_are_near_each_other(known: Known) -
     for uav, bank in ((1, 3.1), (2, -3.1)):
         known.data[("x", uav)] = np.full(len(T), bank)
     apart = 6.2 - 2.0 * math.pi
-    np.testing.assert_allclose(evaluated("wrapped(x - x[2])", known, GRAPH, 1), apart)
-    np.testing.assert_allclose(evaluated("turn_disagreement(x)", known, GRAPH, 1), apart)
-    np.testing.assert_allclose(evaluated("turn_disagreement(x)", known, GRAPH, 2), -apart)
-    assert evaluated("wrapped(x)", known, GRAPH, 1)[0] == 3.1, "what is within half a turn stays"
+    np.testing.assert_allclose(evaluate_expression("wrapped(x - x[2])", known, GRAPH, 1), apart)
+    np.testing.assert_allclose(evaluate_expression("turn_disagreement(x)", known, GRAPH, 1), apart)
+    np.testing.assert_allclose(evaluate_expression("turn_disagreement(x)", known, GRAPH, 2), -apart)
+    assert evaluate_expression("wrapped(x)", known, GRAPH, 1)[0] == 3.1, "what is within half a turn stays"
 
 
 def test_when_a_uav_was_lost_can_be_claimed_of_a_flight_that_was_long_enough(known: Known) -> None:

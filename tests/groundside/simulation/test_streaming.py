@@ -72,8 +72,8 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
     for name in recorded.names[2:] * 2:
         for uav in recorded.uavs:
             np.testing.assert_array_equal(recorded.column(name, uav), flight.column(name, uav))
-    kept = sum(values.nbytes for values in recorded._kept.values())
-    assert kept == recorded._used
+    kept = sum(values.nbytes for values in recorded._cache.values())
+    assert kept == recorded._cached_bytes
     assert kept <= max(memory, 8 * 1201)
 
 
@@ -103,7 +103,7 @@ def peak(tmp_path: Path, seconds: float) -> float:
         "from ftcc.groundside.scenario.loading import load\n"
         "one_process._BLOCK = 8 * 500\n"
         "def ended(*_): print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)\n"
-        "one_process._concluded = ended\n"
+        "one_process._conclude = ended\n"
         "one_process.simulate(resolve(load('containment', duration=float(sys.argv[1]))), sys.argv[2])\n"
     )
     command = [sys.executable, "-c", program, str(seconds), str(tmp_path / f"{seconds:g}")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftcc.groundside.verdict.oscillation import is_driven, oscillation
+from ftcc.groundside.verdict.oscillation import is_forced, oscillation
 
 T = np.arange(0.0, 300.0, 0.01)
 NOISE = np.random.default_rng(1).normal(size=len(T))
@@ -55,5 +55,5 @@ def test_too_few_rows_or_rows_that_are_not_numbers() -> None:
 
 
 def test_an_answer_comes_at_the_commanded_frequency_or_a_multiple() -> None:
-    assert [is_driven(frequency, [0.5]) for frequency in (0.5, 0.99, 1.5, 0.7, 6.0)] == [True] * 3 + [False] * 2
-    assert not is_driven(0.5, [])
+    assert [is_forced(frequency, [0.5]) for frequency in (0.5, 0.99, 1.5, 0.7, 6.0)] == [True] * 3 + [False] * 2
+    assert not is_forced(0.5, [])
