@@ -23,7 +23,7 @@ from ftcc.groundside.report.report import draw_figures
 from ftcc.groundside.results.run import Run
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import simulate
+from ftcc.groundside.simulation import simulate
 
 PICTURES = Path(__file__).parent / "pictures"
 DASHBOARDS = (

@@ -16,7 +16,7 @@ from ftcc.groundside.cli.scenarios import list_all
 from ftcc.groundside.dashboard.panels import panels_of
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.scenario.mission import Mission
-from ftcc.groundside.simulation.one_process import PlainPython, simulate
+from ftcc.groundside.simulation import PlainPython, simulate
 from tests.sitl.conftest import same_flight
 from tests.support.guests import EXAMPLE, forget_schemes, install
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.scenario import Scenario, forms_and_variants, load, resolve
-from ftcc.groundside.simulation.one_process import Flight, fly_in_memory
+from ftcc.groundside.simulation.flight import Flight
+from ftcc.groundside.simulation.one_process import fly_in_memory
 
 __all__ = ["cases_of", "claims_in_flight", "load_case"]
 

@@ -11,7 +11,7 @@ from ftcc.airside import ranges
 from ftcc.airside.ranges import Range
 from ftcc.airside.schemes import find, names
 from ftcc.groundside import ScenarioError, load, resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 from ftcc.sim.plant import DIVERGED, LOST, NUMBER
 
 CASES = [(scheme, form) for scheme in names() for form in find(scheme).forms]

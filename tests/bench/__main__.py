@@ -26,7 +26,7 @@ from rich.table import Table
 
 from ftcc.groundside.scenario.loading import load, shipped
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.simulation import fly_in_memory, simulate
 from ftcc.groundside.swarm.pace import usable_cores
 from tests.bench.flights import FTCC, Flight, fly
 from tests.bench.stages import LAW, stage_times

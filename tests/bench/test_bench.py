@@ -8,7 +8,7 @@ import pytest
 
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 from tests.bench.stubs import KINDS, fly_stub
 from tests.bench.swarms import swarm_file
 

@@ -14,8 +14,8 @@ from ftcc.groundside.claims.claims import Result
 from ftcc.groundside.results import Run
 from ftcc.groundside.scenario.loading import load, read, shipped
 from ftcc.groundside.scenario.mission import Mission, resolve
+from ftcc.groundside.simulation import simulate
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case
-from ftcc.groundside.simulation.one_process import simulate
 
 
 def mission_of(case: str, scenario: str = "containment", **options: Any) -> Mission:

@@ -21,7 +21,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Run folder of `ftcc simulate containment` with the given variants and seed."""
     from ftcc.groundside.scenario.loading import load
     from ftcc.groundside.scenario.mission import resolve
-    from ftcc.groundside.simulation.one_process import simulate
+    from ftcc.groundside.simulation import simulate
 
     def run(variants: tuple[str, ...] = (), seed: int = 1) -> Path:
         folder = tmp_path_factory.mktemp("simulated") / "run"
@@ -93,7 +93,7 @@ def test_a_computer_that_is_too_slow_slows_time_down_and_loses_nobody(
     """Asked for more than it can do, beside other programs: the flight is that of the simulation, only slower."""
     from ftcc.groundside.scenario.loading import load
     from ftcc.groundside.scenario.mission import resolve
-    from ftcc.groundside.simulation.one_process import simulate
+    from ftcc.groundside.simulation import simulate
 
     swarm = swarm_file(tmp_path, uavs, duration=20.0)
     flight = fly(str(swarm), *arguments)
@@ -111,7 +111,7 @@ def test_plain_python_flies_the_same_flight_with_processes(
     """The same functions from datagram to datagram, not compiled."""
     from ftcc.groundside.scenario.loading import load
     from ftcc.groundside.scenario.mission import resolve
-    from ftcc.groundside.simulation.one_process import simulate
+    from ftcc.groundside.simulation import simulate
 
     scenario = ("containment", "--variant", "loss30", "--duration", "1", "--speed", "max", "--pack", "4")
     environment["NUMBA_DISABLE_JIT"] = "1"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import simulate
+from ftcc.groundside.simulation import simulate
 from tests.sitl.conftest import Flight, events, same_flight
 
 NEAR = (

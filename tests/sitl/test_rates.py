@@ -10,7 +10,7 @@ import pytest
 
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import simulate
+from ftcc.groundside.simulation import simulate
 from tests.sitl.conftest import Flight, same_flight
 
 EIGHTY = ["rates.control_rate=80", "rates.plant_step=0.0005", "record_rate=80"]

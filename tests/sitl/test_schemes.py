@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation import simulate
 from ftcc.groundside.simulation.cases import load_case
-from ftcc.groundside.simulation.one_process import simulate
 from ftcc.groundside.verdict import VERDICT_FILE
 from tests.sitl.conftest import Flight, events, same_flight
 

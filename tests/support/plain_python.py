@@ -13,7 +13,7 @@ import numpy as np
 
 from ftcc.groundside import load, resolve
 from ftcc.groundside.scenario.loading import forms_and_variants, read, shipped
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 
 CASES = [(name, form) for name, path in shipped().items() for form in forms_and_variants(read(path))[0]]
 

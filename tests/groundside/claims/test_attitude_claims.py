@@ -14,8 +14,8 @@ from ftcc.groundside.claims.claims import Result
 from ftcc.groundside.claims.expressions import unwrapped, wrapped
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
+from ftcc.groundside.simulation import fly_in_memory
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case
-from ftcc.groundside.simulation.one_process import fly_in_memory
 from tests.groundside.conftest import failing
 
 SYNCHRONIZED = ("monograph", "flight", "flight+bare", "flight+bare+off", "flight+loss_30", "monograph+traditional")

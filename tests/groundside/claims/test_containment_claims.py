@@ -9,7 +9,7 @@ import pytest
 
 from ftcc.groundside.claims.claims import Result
 from ftcc.groundside.scenario.loading import load
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 from tests.groundside.conftest import failing, mission_of
 
 PRINTED = ("monograph", "monograph+off")

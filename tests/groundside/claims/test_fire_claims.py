@@ -10,7 +10,8 @@ import pytest
 
 from ftcc.groundside.scenario.loading import Scenario, ScenarioError, load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory, loop_of
+from ftcc.groundside.simulation import fly_in_memory
+from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.sim.plants import conditions_of
 from tests.groundside.conftest import failing, mission_of
 

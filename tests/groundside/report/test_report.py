@@ -24,7 +24,7 @@ from ftcc.groundside.report.report import write_report
 from ftcc.groundside.results import Run, RunError
 from ftcc.groundside.scenario.loading import forms_and_variants, load, read, shipped
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.simulation import fly_in_memory, simulate
 
 SHEETS = sorted((Path(__file__).parents[3] / "groundside" / "report" / "figures").glob("*.toml"))
 

@@ -16,7 +16,7 @@ from scipy.io import loadmat
 from ftcc.airside.process import columns as autopilot_columns
 from ftcc.groundside import Run, RunError, export, load, resolve
 from ftcc.groundside.results import new_folder
-from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.simulation import fly_in_memory, simulate
 from ftcc.link.recording import ROWS, PartWriter, part_path
 from ftcc.sim.plants import conditions_of
 from ftcc.sim.process import columns as vehicle_columns

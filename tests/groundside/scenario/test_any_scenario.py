@@ -22,7 +22,7 @@ from pydantic import BaseModel
 from ftcc.airside.schemes import find
 from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.scenario.loading import shipped
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 
 TRIED = int(os.environ.get("FTCC_SCENARIOS", "60"))
 SECONDS = 2.0

@@ -9,7 +9,7 @@ import pytest
 from ftcc.airside.references import attitude
 from ftcc.groundside.scenario.loading import ScenarioError, load
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 from ftcc.sim.disturbances import Disturbance
 from ftcc.sim.faults import Fault
 from ftcc.sim.wind import DiscreteGust

@@ -13,7 +13,7 @@ import tomli_w
 from ftcc.airside.references.profiles import Trigger
 from ftcc.groundside.scenario.loading import ScenarioError, load, read, shipped
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation.one_process import simulate
+from ftcc.groundside.simulation import simulate
 
 
 def mission(**options: Any) -> Mission:

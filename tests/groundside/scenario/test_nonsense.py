@@ -11,7 +11,7 @@ import pytest
 
 from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.scenario.mission import Mission
-from ftcc.groundside.simulation.one_process import TooLargeError, fly_in_memory, simulate
+from ftcc.groundside.simulation import TooLargeError, fly_in_memory, simulate
 
 MISSION_AT_500 = ["start.z=500", "leaders.7.z=500", "leaders.8.z=500", "leaders.7.commands.0.altitude=600"]
 GUARDED = (

@@ -12,7 +12,7 @@ import pytest
 from ftcc.airside.schemes import find
 from ftcc.groundside.scenario.loading import ScenarioError, forms_and_variants, load, read, shipped
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory
+from ftcc.groundside.simulation import fly_in_memory
 from ftcc.sim.airframe import Airframe
 
 Document = dict[str, Any]

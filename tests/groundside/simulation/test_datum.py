@@ -8,7 +8,8 @@ import pytest
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
-from ftcc.groundside.simulation.one_process import Flight, fly_in_memory, loop_of
+from ftcc.groundside.simulation import Flight, fly_in_memory
+from ftcc.groundside.simulation.one_process import loop_of
 
 
 def flown(datum: float) -> Flight:

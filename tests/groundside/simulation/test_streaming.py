@@ -20,7 +20,7 @@ from ftcc.groundside.results import Run, merging, run
 from ftcc.groundside.results.table import TableWriter
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation import one_process
+from ftcc.groundside.simulation import fly_in_memory, to_disk
 
 SECONDS = 12.0
 
@@ -39,10 +39,10 @@ def test_blocks_of_any_size_give_the_table_of_the_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
 ) -> None:
     flown = of_a_loss()
-    flight = one_process.fly_in_memory(flown)
+    flight = fly_in_memory(flown)
     assert flight.lost
-    monkeypatch.setattr(one_process, "_BLOCK", block)
-    recorded = one_process.simulate(flown, tmp_path)
+    monkeypatch.setattr(to_disk, "_BLOCK", block)
+    recorded = to_disk.simulate(flown, tmp_path)
     if block == 1:
         assert pq.read_metadata(tmp_path / "signals.parquet").num_row_groups == 1201
     for table, values in (
@@ -64,9 +64,9 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, memory: int
 ) -> None:
     flown = of_a_loss()
-    monkeypatch.setattr(one_process, "_BLOCK", 8 * 250)
-    one_process.simulate(flown, tmp_path)
-    flight = one_process.fly_in_memory(flown)
+    monkeypatch.setattr(to_disk, "_BLOCK", 8 * 250)
+    to_disk.simulate(flown, tmp_path)
+    flight = fly_in_memory(flown)
     monkeypatch.setattr(run, "_MEMORY", memory)
     recorded = Run(tmp_path)
     for name in recorded.names[2:] * 2:
@@ -80,7 +80,7 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
 def test_parts_are_joined_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.groundside.results.test_run import write_parts
 
-    whole = one_process.simulate(of_a_loss(), tmp_path / "whole")
+    whole = to_disk.simulate(of_a_loss(), tmp_path / "whole")
 
     def keep(uav: int, role: str) -> int | None:
         return {(2, "autopilot"): 700, (3, "vehicle"): 500, (5, "vehicle"): 0}.get((uav, role))
@@ -98,13 +98,13 @@ def peak(tmp_path: Path, seconds: float) -> float:
     """Peak of memory while a flight of so many seconds is flown and recorded, but not yet judged, MB."""
     program = (
         "import resource, sys\n"
-        "from ftcc.groundside.simulation import one_process\n"
+        "from ftcc.groundside.simulation import to_disk\n"
         "from ftcc.groundside.scenario.mission import resolve\n"
         "from ftcc.groundside.scenario.loading import load\n"
-        "one_process._BLOCK = 8 * 500\n"
+        "to_disk._BLOCK = 8 * 500\n"
         "def ended(*_): print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)\n"
-        "one_process._conclude = ended\n"
-        "one_process.simulate(resolve(load('containment', duration=float(sys.argv[1]))), sys.argv[2])\n"
+        "to_disk._conclude = ended\n"
+        "to_disk.simulate(resolve(load('containment', duration=float(sys.argv[1]))), sys.argv[2])\n"
     )
     command = [sys.executable, "-c", program, str(seconds), str(tmp_path / f"{seconds:g}")]
     return float(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
@@ -117,7 +117,7 @@ def test_a_long_flight_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> 
 
 
 def test_ctrl_c_while_a_block_is_written_leaves_whole_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(one_process, "_BLOCK", 8 * 100)
+    monkeypatch.setattr(to_disk, "_BLOCK", 8 * 100)
     write = TableWriter.write
     blocks: list[int] = []
 
@@ -131,7 +131,7 @@ def test_ctrl_c_while_a_block_is_written_leaves_whole_blocks(tmp_path: Path, mon
     # As at a terminal: whoever started the tests may have had Ctrl-C ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        recorded = one_process.simulate(mission(), tmp_path)
+        recorded = to_disk.simulate(mission(), tmp_path)
     finally:
         signal.signal(signal.SIGINT, before)
     rows = recorded.signals.num_rows

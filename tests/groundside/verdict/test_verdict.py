@@ -14,7 +14,7 @@ from ftcc.groundside import Run
 from ftcc.groundside.dashboard.replay import snapshots_of
 from ftcc.groundside.scenario.loading import ScenarioError, load
 from ftcc.groundside.scenario.mission import Mission, resolve
-from ftcc.groundside.simulation.one_process import fly_in_memory, simulate
+from ftcc.groundside.simulation import fly_in_memory, simulate
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, VERDICT_FILE, Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.sim.plants import conditions_of

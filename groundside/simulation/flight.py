@@ -1,0 +1,129 @@
+"""A flight in memory: the same columns as a recorded run."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.scenario import Mission
+from ftcc.groundside.verdict import Verdict, judge
+from ftcc.link.actuators import SLOT
+from ftcc.link.channel import LINK_REPORT
+from ftcc.sim.obstacles import clearance, zones_of
+from ftcc.sim.plant import TRUTH
+from ftcc.sim.plants import conditions_of, find
+
+__all__ = ["Flight"]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight, or a part of one, in memory; offers its columns as a `Run` does."""
+
+    mission: Mission
+    truth: NDArray[np.float64]
+    """(n, k, 13): recorded tick, UAV in the order of the mission, in the order of ``TRUTH``; nan once a UAV is lost."""
+    command: NDArray[np.float64]
+    """(n, k, 4): in force, by the actuators' slots."""
+    acting: NDArray[np.float64]
+    """(n, k, 4): what acts on the airframe."""
+    conditions: NDArray[np.float64]
+    """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
+    signals: NDArray[np.float64]
+    """(n, k, s): in the order of the scheme's ``SIGNALS``."""
+    links: NDArray[np.float64]
+    """(m, k, e, 5): a row per report and in-edge, in the order of the neighbours; see ``link.channel.LINK_REPORT``."""
+    t: NDArray[np.float64]
+    """(n,): s."""
+    lost: dict[int, tuple[float, str]]
+    """When (s) and why a UAV was lost."""
+    events: tuple[tuple[float, int, str, str], ...] = ()
+    """What happened otherwise: time s, UAV, severity, text."""
+    first_report: int = 0
+    """Number of the first one in ``links``."""
+
+    @property
+    def uavs(self) -> tuple[int, ...]:
+        """Ids, ascending."""
+        return tuple(sorted(self.mission.uavs))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self._places)
+
+    @property
+    def _places(self) -> dict[str, tuple[NDArray[np.float64], int]]:
+        places = {name: (self.truth, n) for n, name in enumerate(TRUTH)}
+        actuators = find(self.mission.plant).ACTUATORS
+        places |= {f"{name}_command": (self.command, SLOT[name]) for name in actuators}
+        places |= {name: (self.acting, SLOT[name]) for name in actuators}
+        places |= {name: (self.conditions, n) for n, (name, _) in enumerate(conditions_of(self.mission.plant))}
+        if self.mission.obstacles:
+            places["clearance"] = (self.clearance, 0)
+        return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
+
+    @functools.cached_property
+    def clearance(self) -> NDArray[np.float64]:
+        """(n, k, 1): height above the obstacle below, m."""
+        zones = zones_of(self.mission.obstacles)
+        x, z = self.truth[:, :, TRUTH.index("x")], self.truth[:, :, TRUTH.index("z")]
+        heights = [clearance(zones, *place) for place in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)]
+        return np.array(heights).reshape(*x.shape, 1)
+
+    @functools.cached_property
+    def verdict(self) -> Verdict:
+        """How it went."""
+        return judge(self, self.mission, self.lost)
+
+    @functools.cached_property
+    def _flown(self) -> list[int]:
+        """Rows of each UAV, in the order of the mission."""
+        return [int(rows) for rows in np.isfinite(self.truth[:, :, 0]).sum(axis=0)]
+
+    def column(self, name: str, uav: int) -> NDArray[np.float64]:
+        """A column of one UAV in order of time, as far as it flew."""
+        i = self.mission.uavs.index(uav)
+        rows = self._flown[i]
+        if name == "t":
+            return self.t[:rows]
+        values, n = self._places[name]
+        return values[:rows, i, n]
+
+    def link_table(self) -> dict[str, NDArray[Any]]:
+        """A row per report and in-edge, by time, then receiver; the columns of ``link.recording.LINK_COLUMNS``."""
+        timing = self.mission.timing
+        numbers = np.arange(self.first_report, self.first_report + len(self.links))
+        times = numbers * (timing.report_every * timing.period_us / 1e6)
+        edges = [
+            (i, edge, spec.uav, neighbour.uav)
+            for i, spec in sorted(enumerate(self.mission.autopilots), key=lambda pair: pair[1].uav)
+            for edge, neighbour in enumerate(spec.neighbours)
+        ]
+        values = [self.links[:, i, edge] for i, edge, _, _ in edges]
+        rows = np.stack(values, axis=1) if values else np.empty(0)
+        rows = rows.reshape(len(times) * len(edges), len(LINK_REPORT))
+        table: dict[str, NDArray[Any]] = {
+            "t": np.repeat(times, len(edges)),
+            "uav": np.tile(np.array([edge[2] for edge in edges], np.int32), len(times)),
+            "sender": np.tile(np.array([edge[3] for edge in edges], np.int32), len(times)),
+        }
+        table |= {name: rows[:, n] for n, name in enumerate(LINK_REPORT)}
+        reported = np.isfinite(table["sent"])
+        return {name: column[reported] for name, column in table.items()}
+
+    def table(self) -> dict[str, NDArray[Any]]:
+        """All columns, a row per recorded tick and UAV, by time, then UAV."""
+        order = np.argsort(self.mission.uavs)
+        flown = np.isfinite(self.truth[:, order, 0]).ravel()
+        table: dict[str, NDArray[Any]] = {
+            "t": np.repeat(self.t, len(order))[flown],
+            "uav": np.tile(np.array(self.mission.uavs, np.int32)[order], len(self.t))[flown],
+        }
+        for name, (values, n) in self._places.items():
+            table[name] = values[:, order, n].ravel()[flown]
+        return table

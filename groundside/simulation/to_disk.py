@@ -1,0 +1,94 @@
+"""A flight in one process, written to a folder block by block: an hour takes as much memory as a minute."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil  # type: ignore[import-untyped]
+
+from ftcc.airside.compiled_stages import stages_of
+from ftcc.groundside.results import Run, TableWriter
+from ftcc.groundside.scenario import Mission
+from ftcc.groundside.simulation.flight import Flight
+from ftcc.groundside.simulation.one_process import Progress, defer_interrupt, fly_in_parts
+from ftcc.groundside.simulation.space import recording_size, require_space
+from ftcc.groundside.verdict import VERDICT_FILE, judge
+from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
+
+__all__ = ["simulate"]
+
+_BLOCK = 65536
+"""Rows, of all UAVs together, that `simulate` has in memory and then writes."""
+_LEAST_SHARE = 0.1
+"""Of what rows take in memory, what they take on disk at the very least: only what never changes takes less."""
+
+
+def simulate(
+    mission: Mission, folder: Path, progress: Progress | None = None, ready: Callable[[], None] | None = None
+) -> Run:
+    """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would.
+
+    Raises
+    ------
+    TooLargeError
+        If the recording surely does not fit on the disk.
+    OSError
+        If it cannot be written, as on a disk that is full.
+    """
+    # What the columns' descriptions pull in is not needed where nothing is recorded.
+    from ftcc.airside.process import columns as autopilot_columns
+    from ftcc.sim.process import columns as vehicle_columns
+
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    require_space(
+        mission, _LEAST_SHARE * recording_size(mission)[1], psutil.disk_usage(str(folder)).free / 1e9, "disk at least"
+    )
+    timing = mission.timing
+    columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
+    last = 0.0
+    with (
+        TableWriter(folder / "signals.parquet", columns) as signals,
+        TableWriter(folder / "links.parquet", LINK_COLUMNS) as links,
+    ):
+
+        def take(part: Flight) -> None:
+            nonlocal last
+            signals.write(part.table())
+            links.write(part.link_table())
+            last = float(part.t[-1]) if len(part.t) else last
+
+        room = min(timing.ticks + 1, max(1, _BLOCK // len(mission.uavs)) * timing.record_every)
+        rest = fly_in_parts(mission, room, take, progress, ready)
+        with contextlib.suppress(KeyboardInterrupt), defer_interrupt():
+            take(rest)
+    return _conclude(mission, folder, last, rest)
+
+
+def _conclude(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
+    """The run of a flight whose signals up to ``last`` (s) are in ``folder``: with scenario, events and verdict."""
+    (folder / "scenario.toml").write_text(mission.toml_of_run(time.time()), encoding="utf-8")
+    events = EventLog(folder / "events.jsonl")
+    for t, uav, severity, text in mission.events:
+        if t <= last:
+            events.write(t, text, uav, severity)
+    if refusal := stages_of(mission.scheme.name).REFUSAL:
+        events.write(0.0, refusal, severity="warning")
+    for uav, (t, why) in flight.lost.items():
+        events.write(t, f"{AIRCRAFT_LOST}{why}", uav, "error")
+    for t, uav, severity, text in flight.events:
+        events.write(t, text, uav, severity)
+    if last < mission.timing.duration - mission.timing.period * mission.timing.record_every:
+        events.write(last, "interrupted", severity="warning")
+    run = Run(folder)
+    run.mission = mission
+    run.verdict = judge(run, mission, flight.lost)
+    events.write(last, run.verdict.text, severity=run.verdict.severity)
+    events.close()
+    if events.trouble:
+        raise OSError(f"{events.path}: {events.trouble}")
+    (folder / VERDICT_FILE).write_text(run.verdict.dumps(), encoding="utf-8")
+    return run
