@@ -10,13 +10,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.groundside.results.folders import NothingRecordedError
 from ftcc.groundside.results.table import TableWriter
 from ftcc.link.recording import Column
 
-__all__ = ["merge_parts"]
+__all__ = ["merge_parts", "merge_run", "up_to_date_table"]
 
 _BLOCK = 65536
 """Rows, of all UAVs together, that are joined at a time."""
+
+
+def up_to_date_table(run: Path) -> Path:
+    """``signals.parquet`` in a run's folder, merged from the parts if it is missing or older than they are.
+
+    Raises
+    ------
+    NothingRecordedError
+        If no process wrote anything.
+    """
+    path = run / "signals.parquet"
+    merged = path.is_file() and path.stat().st_mtime_ns >= _last_write(run)
+    return path if merged else merge_run(run)
+
+
+def merge_run(run: Path) -> Path:
+    """Merge the parts in a run's folder into its ``signals.parquet``.
+
+    Raises
+    ------
+    NothingRecordedError
+        If no process wrote anything.
+    """
+    # Read before the parts: if they grow during the merge, the table is out of date.
+    as_of = _last_write(run)
+    target = run / "signals.parquet"
+    if not merge_parts(run / "parts", target, as_of):
+        raise NothingRecordedError(f"{run}: nothing was recorded")
+    return target
+
+
+def _last_write(run: Path) -> int:
+    """When a process last wrote a part, ns; 0 without parts."""
+    return max((part.stat().st_mtime_ns for part in (run / "parts").glob("*.arrows")), default=0)
 
 
 class _Part:

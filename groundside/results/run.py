@@ -6,15 +6,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.results.folders import NothingRecordedError, RunError
-from ftcc.groundside.results.merging import merge_parts
+from ftcc.groundside.results.column_reader import ColumnReader
+from ftcc.groundside.results.folders import RunError
+from ftcc.groundside.results.merging import merge_run, up_to_date_table
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 
 if TYPE_CHECKING:
@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from ftcc.groundside.verdict import Verdict
 
 __all__ = ["Run"]
-
-
-_MEMORY = 128 << 20
-"""Bytes of columns that a run keeps in memory."""
 
 
 class Run:
@@ -43,10 +39,7 @@ class Run:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._cache: dict[tuple[str, int], NDArray[Any]] = {}
-        """Columns by name and UAV, what was asked for last at the end."""
-        self._cached_bytes = 0
-        """Bytes of them."""
+        self._columns = ColumnReader(self.path)
         if not (self.path / "scenario.toml").is_file():
             raise RunError(f"{self.path}: is not the folder of a run (it contains no scenario.toml)")
 
@@ -103,15 +96,8 @@ class Run:
 
     @property
     def file(self) -> Path:
-        """``signals.parquet``, merged from the parts where there is none or they have grown since."""
-        path = self.path / "signals.parquet"
-        merged = path.is_file() and path.stat().st_mtime_ns >= self._recorded_until
-        return path if merged else self.merge()
-
-    @property
-    def _recorded_until(self) -> int:
-        """When a process last wrote a part, ns; 0 without parts."""
-        return max((part.stat().st_mtime_ns for part in (self.path / "parts").glob("*.arrows")), default=0)
+        """``signals.parquet``, merged from the parts if it is missing or older than they are."""
+        return up_to_date_table(self.path)
 
     @functools.cached_property
     def signals(self) -> Any:
@@ -119,71 +105,12 @@ class Run:
 
         All of it, in memory: of a long flight, ask for one `column` after the other.
         """
-        return self._readable(self._open.read)
+        return self._columns.read_all()
 
-    @functools.cached_property
-    def _open(self) -> Any:
-        """The file, kept open: a run that goes on may be merged anew meanwhile, and this one shows one state of it."""
-        import pyarrow.parquet as pq
-
-        return self._readable(lambda: pq.ParquetFile(self.file))
-
-    @functools.cached_property
+    @property
     def columns(self) -> dict[str, Column]:
         """Name, unit and meaning of every column."""
-        found = {}
-        for field in self._open.schema_arrow:
-            notes = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-            found[field.name] = Column(field.name, notes.get("unit", ""), notes.get("meaning", ""))
-        return found
-
-    @functools.cached_property
-    def _rows(self) -> dict[int, int]:
-        """How many rows there are of each UAV, by id, ascending."""
-        rows: dict[int, int] = {}
-        for group in range(self._open.num_row_groups):
-            for uav, count in zip(*np.unique(self._group(group, ["uav"])[0], return_counts=True), strict=True):
-                rows[int(uav)] = rows.get(int(uav), 0) + int(count)
-        return dict(sorted(rows.items()))
-
-    def _group(self, group: int, names: list[str]) -> list[NDArray[Any]]:
-        """Columns of a group of rows, all UAVs together."""
-        table = self._readable(lambda: self._open.read_row_group(group, columns=names))
-        return [table.column(name).to_numpy() for name in names]
-
-    def _read(self, name: str, uavs: Sequence[int]) -> dict[int, NDArray[Any]]:
-        """A column of some UAVs, each in order of time. No more than a group of rows is there of the others."""
-        found = {
-            uav: np.empty(self._rows[uav], self._open.schema_arrow.field(name).type.to_pandas_dtype()) for uav in uavs
-        }
-        filled = dict.fromkeys(uavs, 0)
-        everybody = np.array(list(self._rows))
-        k = len(everybody)
-        for group in range(self._open.num_row_groups):
-            values, whose = self._group(group, [name, "uav"])
-            if len(whose) % k == 0 and (whose.reshape(-1, k) == everybody).all():
-                # As it mostly is: everybody has a row at every time.
-                parts = [values[n::k] for n in range(k)]
-            else:
-                order = np.argsort(whose, kind="stable")
-                parts = np.split(values[order], np.searchsorted(whose[order], everybody[1:]))
-            for uav, part in zip(self._rows, parts, strict=True):
-                if uav in found:
-                    found[uav][filled[uav] : filled[uav] + len(part)] = part
-                    filled[uav] += len(part)
-        return found
-
-    def _readable(self, read: Callable[[], Any]) -> Any:
-        """What ``read`` gives, or a message that says which file is damaged and what may help."""
-        import pyarrow as pa
-
-        try:
-            return read()
-        except (pa.ArrowInvalid, pa.ArrowException, OSError) as error:
-            what = str(error).splitlines()[0]
-            raise RunError(
-                f"{self.path / 'signals.parquet'}: cannot be read ({what}); a run with parts/ merges again without it"
-            ) from None
+        return self._columns.columns
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -192,28 +119,20 @@ class Run:
 
     @property
     def uavs(self) -> tuple[int, ...]:
-        """Ids of those of whom there are rows."""
-        return tuple(self._rows)
+        """Ids of the UAVs that have rows."""
+        return self._columns.uavs
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
         """A column of one UAV in order of time; empty if the UAV has no rows.
 
-        What was asked for lately is kept in memory, up to a limit.
+        Columns used lately stay in memory, up to a limit.
+
+        Raises
+        ------
+        RunError
+            If there is no such column.
         """
-        if name not in self.columns:
-            raise RunError(f"{self.path}: there is no column {name!r}; there are {', '.join(self.columns)}")
-        if uav not in self._rows:
-            return np.empty(0)
-        if (name, uav) not in self._cache:
-            # Of a short flight, others will be asked for next; of a long one, there is no room for theirs.
-            small = 8 * self._open.metadata.num_rows <= _MEMORY / 4
-            for one, values in self._read(name, list(self._rows) if small else [uav]).items():
-                self._cache[name, one] = values
-                self._cached_bytes += values.nbytes
-        found = self._cache[name, uav] = self._cache.pop((name, uav))
-        while self._cached_bytes > _MEMORY and len(self._cache) > 1:
-            self._cached_bytes -= self._cache.pop(next(iter(self._cache))).nbytes
-        return found
+        return self._columns.column(name, uav)
 
     def merge(self) -> Path:
         """Join what the processes wrote into ``signals.parquet``; what a killed one wrote counts to its last batch.
@@ -225,12 +144,7 @@ class Run:
         RunError
             If no process wrote anything: `NothingRecordedError`.
         """
-        # Taken before the parts are read: what is written to them meanwhile makes the table old.
-        as_of = self._recorded_until
-        target = self.path / "signals.parquet"
-        if not merge_parts(self.path / "parts", target, as_of):
-            raise NothingRecordedError(f"{self.path}: nothing was recorded")
-        return target
+        return merge_run(self.path)
 
     @functools.cached_property
     def links(self) -> dict[str, NDArray[Any]]:

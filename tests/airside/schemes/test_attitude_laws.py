@@ -227,7 +227,7 @@ def test_a_flight_in_plain_python_has_the_same_bits(law):
         "import hashlib, numpy as np\n"
         "from ftcc.groundside.scenario.mission import resolve\n"
         "from ftcc.groundside.scenario.loading import load\n"
-        "from ftcc.groundside.simulation.one_process import fly_in_memory\n"
+        "from ftcc.groundside.simulation import fly_in_memory\n"
         f"scenario = load({law!r}, settings=('channel.loss=0.3', 'noise.p=0.01'), duration=0.12)\n"
         "flight = fly_in_memory(resolve(scenario))\n"
         "assert np.isfinite(flight.signals).all()\n"

@@ -16,7 +16,7 @@ import pytest
 
 from ftcc.groundside.claims.claims import evaluate
 from ftcc.groundside.cli.app import main
-from ftcc.groundside.results import Run, merging, run
+from ftcc.groundside.results import Run, column_reader, merging
 from ftcc.groundside.results.table import TableWriter
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import Mission, resolve
@@ -67,13 +67,13 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
     monkeypatch.setattr(to_disk, "_BLOCK", 8 * 250)
     to_disk.simulate(flown, tmp_path)
     flight = fly_in_memory(flown)
-    monkeypatch.setattr(run, "_MEMORY", memory)
+    monkeypatch.setattr(column_reader, "_MEMORY", memory)
     recorded = Run(tmp_path)
     for name in recorded.names[2:] * 2:
         for uav in recorded.uavs:
             np.testing.assert_array_equal(recorded.column(name, uav), flight.column(name, uav))
-    kept = sum(values.nbytes for values in recorded._cache.values())
-    assert kept == recorded._cached_bytes
+    kept = sum(values.nbytes for values in recorded._columns._cache.values())
+    assert kept == recorded._columns._cached_bytes
     assert kept <= max(memory, 8 * 1201)
 
 

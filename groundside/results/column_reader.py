@@ -1,0 +1,130 @@
+"""``signals.parquet`` read column by column: a long flight takes no more memory than a short one."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.groundside.results.folders import RunError
+from ftcc.groundside.results.merging import up_to_date_table
+from ftcc.link.recording import Column
+
+__all__ = ["ColumnReader"]
+
+_MEMORY = 128 << 20
+"""Bytes of columns that a reader keeps in memory."""
+
+
+class ColumnReader:
+    """The columns of a recording, read when they are first needed.
+
+    Parameters
+    ----------
+    run : Path
+        The run's folder; its parts are merged at the first access if that is necessary.
+    """
+
+    def __init__(self, run: Path) -> None:
+        self._run = run
+        self._cache: dict[tuple[str, int], NDArray[Any]] = {}
+        """Columns by name and UAV, the latest use last."""
+        self._cached_bytes = 0
+        """Bytes of these columns."""
+
+    def read_all(self) -> Any:
+        """The whole recording as a ``pyarrow.Table``."""
+        return self._readable(self._open.read)
+
+    @functools.cached_property
+    def _open(self) -> Any:
+        """The file, kept open: a run in progress may be merged again, but this reader shows one state of it."""
+        import pyarrow.parquet as pq
+
+        return self._readable(lambda: pq.ParquetFile(up_to_date_table(self._run)))
+
+    @functools.cached_property
+    def columns(self) -> dict[str, Column]:
+        """Name, unit and meaning of every column."""
+        found = {}
+        for field in self._open.schema_arrow:
+            notes = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+            found[field.name] = Column(field.name, notes.get("unit", ""), notes.get("meaning", ""))
+        return found
+
+    @functools.cached_property
+    def _rows(self) -> dict[int, int]:
+        """How many rows there are of each UAV, by id, ascending."""
+        rows: dict[int, int] = {}
+        for group in range(self._open.num_row_groups):
+            for uav, count in zip(*np.unique(self._group(group, ["uav"])[0], return_counts=True), strict=True):
+                rows[int(uav)] = rows.get(int(uav), 0) + int(count)
+        return dict(sorted(rows.items()))
+
+    def _group(self, group: int, names: list[str]) -> list[NDArray[Any]]:
+        """Columns of a group of rows, all UAVs together."""
+        table = self._readable(lambda: self._open.read_row_group(group, columns=names))
+        return [table.column(name).to_numpy() for name in names]
+
+    def _read(self, name: str, uavs: Sequence[int]) -> dict[int, NDArray[Any]]:
+        """A column of some UAVs, each in order of time. No more than a group of rows is there of the others."""
+        found = {
+            uav: np.empty(self._rows[uav], self._open.schema_arrow.field(name).type.to_pandas_dtype()) for uav in uavs
+        }
+        filled = dict.fromkeys(uavs, 0)
+        everybody = np.array(list(self._rows))
+        k = len(everybody)
+        for group in range(self._open.num_row_groups):
+            values, whose = self._group(group, [name, "uav"])
+            if len(whose) % k == 0 and (whose.reshape(-1, k) == everybody).all():
+                # As it mostly is: everybody has a row at every time.
+                parts = [values[n::k] for n in range(k)]
+            else:
+                order = np.argsort(whose, kind="stable")
+                parts = np.split(values[order], np.searchsorted(whose[order], everybody[1:]))
+            for uav, part in zip(self._rows, parts, strict=True):
+                if uav in found:
+                    found[uav][filled[uav] : filled[uav] + len(part)] = part
+                    filled[uav] += len(part)
+        return found
+
+    def _readable(self, read: Callable[[], Any]) -> Any:
+        """What ``read`` gives, or a message that says which file is damaged and what may help."""
+        import pyarrow as pa
+
+        try:
+            return read()
+        except (pa.ArrowInvalid, pa.ArrowException, OSError) as error:
+            what = str(error).splitlines()[0]
+            raise RunError(
+                f"{self._run / 'signals.parquet'}: cannot be read ({what}); a run with parts/ merges again without it"
+            ) from None
+
+    @property
+    def uavs(self) -> tuple[int, ...]:
+        """Ids of the UAVs that have rows."""
+        return tuple(self._rows)
+
+    def column(self, name: str, uav: int) -> NDArray[np.float64]:
+        """A column of one UAV in order of time; empty if the UAV has no rows.
+
+        Columns used lately stay in memory, up to a limit.
+        """
+        if name not in self.columns:
+            raise RunError(f"{self._run}: there is no column {name!r}; there are {', '.join(self.columns)}")
+        if uav not in self._rows:
+            return np.empty(0)
+        if (name, uav) not in self._cache:
+            # Of a short flight, others will be asked for next; of a long one, there is no room for theirs.
+            small = 8 * self._open.metadata.num_rows <= _MEMORY / 4
+            for one, values in self._read(name, list(self._rows) if small else [uav]).items():
+                self._cache[name, one] = values
+                self._cached_bytes += values.nbytes
+        found = self._cache[name, uav] = self._cache.pop((name, uav))
+        while self._cached_bytes > _MEMORY and len(self._cache) > 1:
+            self._cached_bytes -= self._cache.pop(next(iter(self._cache))).nbytes
+        return found
