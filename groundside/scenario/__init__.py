@@ -1,4 +1,4 @@
-"""From scenario files to what every process is told: finding, merging, checking, and the `Mission` that results."""
+"""From scenario files to a `Mission`, which holds the spec of each process: find, merge, check."""
 
 import lazy_loader
 

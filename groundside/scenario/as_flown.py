@@ -1,4 +1,4 @@
-"""The scenario as it was flown: one file with everything that flies the same flight again."""
+"""The scenario as flown: one file that is enough to repeat the flight."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ftcc.groundside.scenario.loading import Scenario
 __all__ = ["as_flown"]
 
 _VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "eclipse-zenoh")
-"""What the numbers of a flight may depend on."""
+"""Packages on whose version the numbers of a flight may depend."""
 
 
 @functools.cache
@@ -29,7 +29,10 @@ def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
 
 
 def as_flown(scenario: Scenario, scheme: Scheme) -> str:
-    """The merged scenario with seed, versions, and every gain by value: a later default must not change it."""
+    """Return the merged scenario with seed, versions and the value of every gain, as TOML.
+
+    A default that changes in a later version does not change this flight.
+    """
     document = {key: value for key, value in scenario.document.items() if key != "flown"}
     document["seed"] = scenario.plan.seed
     gains = document.get("gains", {})

@@ -1,4 +1,4 @@
-"""What only the scenario as a whole can show: scheme and plant, time grid, graph, travel."""
+"""Checks of a scenario as a whole: scheme and plant, time grid, graph, actuator limits."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ __all__ = [
 ]
 
 IDEAL = "monograph"
-"""The form with ideal exchange, which no processes can fly."""
+"""The form with ideal exchange; it flies only in one process."""
 
 _NEGLIGIBLE = 1e-6
-"""Share of the largest weight below which an edge is as good as none."""
+"""An edge whose weight is below this share of the largest weight has no practical effect."""
 _OFF_GRID = 0.01
-"""By how much a period may miss whole microseconds, as rates are written in decimals, us."""
+"""Largest distance of a period from whole microseconds, us; rates are decimal numbers."""
 _MOST_PERIODS = 30
-"""Latency, delay and jitter together in exchange periods: the inbox and the mesh keep that many records."""
+"""Largest sum of latency, delay and jitter, in exchange periods: inbox and mesh keep that many records."""
 
 
 class Findings:
-    """Collects what is wrong, so that a user sees all of it at once."""
+    """Collects errors and warnings, so that a user sees all of them at once."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -61,7 +61,7 @@ class Findings:
 
 
 def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
-    """The scheme, which must have the form that is asked for and signals with names of their own."""
+    """Find the scheme. Refuse a form that it lacks, and signals named like other recorded columns."""
     try:
         scheme = find_scheme(scenario.plan.scheme)
     except (LookupError, SchemeError) as error:
@@ -82,7 +82,7 @@ def scheme_of(scenario: Scenario, findings: Findings) -> Scheme:
 
 
 def check_tracking(scheme: Scheme, columns: Sequence[str], findings: Findings) -> None:
-    """Tracking errors and bounds must be arithmetic over recorded columns."""
+    """Refuse tracking errors and bounds that are not arithmetic over recorded columns."""
     expressions = [("TRACKING", error.name) for error in scheme.tracking]
     expressions += [("TRACKING", error.bound) for error in scheme.tracking if isinstance(error.bound, str)]
     expressions += [("SIGNALS", signal.bound) for signal in scheme.signals if isinstance(signal.bound, str)]
@@ -94,7 +94,7 @@ def check_tracking(scheme: Scheme, columns: Sequence[str], findings: Findings) -
 
 
 def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:
-    """The plant, which must be one that the scheme can fly."""
+    """Find the plant. Refuse one that the scheme cannot fly."""
     name = plan.plant.model or scheme.plant
     serving = [one for one in plants.names() if scheme.plant in plants.find(one).SERVES]
     if name not in serving:
@@ -105,7 +105,7 @@ def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:
 
 
 def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
-    """The time grid; between processes (``wire``) the control period is at least 1 ms."""
+    """Return the time grid. Between processes (``wire``) the control period must be at least 1 ms."""
     rates = plan.rates
     period, step = 1e6 / rates.control_rate, rates.plant_step * 1e6
     _check_grid(rates, period, step, wire, findings)
@@ -153,7 +153,7 @@ def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
 
 
 def _check_grid(rates: Rates, period: float, step: float, wire: bool, findings: Findings) -> None:
-    """Refuse a control period or a plant's step (us) that is off the grid."""
+    """Refuse a control period or a plant step (us) that is not on the grid of simulated time."""
     where = f"rates.control_rate = {rates.control_rate:g}: a period of {period / 1e3:.9g} ms; "
     least = 1000.0 if wire else 500.0
     if abs(period - round(period)) > _OFF_GRID:
@@ -175,7 +175,7 @@ def _check_grid(rates: Rates, period: float, step: float, wire: bool, findings: 
 
 
 def check_delays(plan: Plan, timing: Timing, findings: Findings) -> None:
-    """Refuse links so slow that records under way would overrun the buffers."""
+    """Refuse links so slow that records in transit would overflow the buffers."""
     most = _MOST_PERIODS * timing.exchange_us / 1e6
     base = plan.channel
     asked = [("channel", base.delay, base.jitter)]
@@ -191,7 +191,7 @@ def check_delays(plan: Plan, timing: Timing, findings: Findings) -> None:
 
 
 def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
-    """The communication graph, which must satisfy the scheme's assumption."""
+    """Return the communication graph. Refuse one that does not satisfy the scheme's assumption."""
     followers, leaders = tuple(plan.uavs.followers), tuple(plan.uavs.leaders)
     uavs = followers + leaders
     twice = sorted({uav for uav in uavs if uavs.count(uav) > 1})
@@ -222,7 +222,7 @@ def graph_of(plan: Plan, scheme: Scheme, findings: Findings) -> Graph:
 
 
 def _warn_of_ineffective_edges(graph: Graph, findings: Findings) -> None:
-    """Say which edges and leaders are without effect."""
+    """Warn of edges and leaders that have no effect."""
     for (receiver, sender), weight in graph.weights.items():
         if receiver in graph.leaders and sender in graph.followers:
             findings.warn(f"graph.edges: {sender} -> {receiver} has no effect: leaders do not receive from followers")
@@ -244,7 +244,10 @@ def require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Fin
 
 
 def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[float, float], ...]:
-    """Travel by slot; (0, 0) for what the plant lacks, which nothing else may speak of either."""
+    """Return [lowest, highest] of each actuator, by slot; (0, 0) for one that the plant lacks.
+
+    Refuse any other field about an actuator that the plant lacks.
+    """
     limits = [(0.0, 0.0)] * len(ACTUATORS)
     actuators = plant.ACTUATORS
     for name, slot in SLOT.items():
@@ -280,7 +283,7 @@ def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[
 
 
 def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
-    """Refuse initial states, noise and disturbances that the plant does not have."""
+    """Refuse initial states, noise and disturbances that the plant lacks."""
     starts = [("start", plan.start), *((f"start.uav.{uav}", start) for uav, start in plan.start.uav.items())]
     for where, start in starts:
         for name in Start.model_fields:
@@ -288,7 +291,7 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
                 findings.refuse(f"{where}.{name}: the plant has no such state; it has {', '.join(plant.START)}")
     deviations = plan.noise.deviations
     for name in plant.COMPLETED:
-        # Of pitch angle and angle of attack either may be the one that is measured.
+        # Either the pitch angle or the angle of attack is measured.
         instead = name == "alpha" and deviations["theta"] == 0.0
         if deviations[name] > 0.0 and not instead:
             findings.refuse(f"noise.{name}: is computed from other measured channels; give their noise instead")

@@ -1,4 +1,4 @@
-"""The columns of a recording: which come first, and which of them an aircraft has."""
+"""The first columns of a recording."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ __all__ = ["LEADING", "leading_columns"]
 _SHOWN = ("thrust", "elevator", "aileron", "rudder", "load_factor", "bank")
 
 LEADING = ("t", "uav", *TRUTH, *(f"{name}_command" for name in _SHOWN), *_SHOWN)
-"""The first columns of ``signals.parquet``, of all plants; the scheme's SIGNALS follow."""
+"""The first columns of ``signals.parquet``, over all plants; the scheme's SIGNALS follow."""
 
 
 def leading_columns(actuators: Collection[str]) -> list[str]:
-    """Those of an aircraft with these actuators."""
+    """Return those first columns that an aircraft with these actuators has."""
     lacking = {name for name in _SHOWN if name not in actuators}
     return [name for name in LEADING if name.removesuffix("_command") not in lacking]

@@ -1,4 +1,4 @@
-"""What the faults of a scenario do to its vehicles, and whether these can still fly level."""
+"""The faults of a scenario, by vehicle, and whether a vehicle with a fault can still fly level."""
 
 from __future__ import annotations
 
@@ -30,12 +30,15 @@ _NAVIGATION_KINDS = {
 
 
 def _part(fault: FaultFields) -> tuple[int, str | None, str | None]:
-    """What fails: UAV, actuator, part of its navigation."""
+    """Return the faulty part: UAV, actuator, part of the navigation."""
     return fault.uav, fault.actuator, fault.navigation
 
 
 def _with_repairs(plan: Plan) -> list[FaultFields]:
-    """The faults, in order of time, and a repair wherever one ends and no other of the same part begins just then."""
+    """Return faults and repairs in order of time.
+
+    A repair is added where a fault ends and no other fault of the same part begins at that time.
+    """
     beginnings = {(fault.at, _part(fault)) for fault in plan.faults}
     repairs = [
         FaultFields(at=f.until, uav=f.uav, actuator=f.actuator, navigation=f.navigation, kind="ok")
@@ -46,7 +49,7 @@ def _with_repairs(plan: Plan) -> list[FaultFields]:
 
 
 def check_fault_times(plan: Plan, findings: Findings) -> None:
-    """Refuse a fault that begins while another one of the same part has not come to its ``until``."""
+    """Refuse a fault that begins before another fault of the same part ends at its ``until``."""
     for n, fault in enumerate(plan.faults):
         for m, other in enumerate(plan.faults):
             if m == n or fault.until is None or _part(other) != _part(fault):
@@ -59,7 +62,7 @@ def check_fault_times(plan: Plan, findings: Findings) -> None:
 
 
 def actuator_faults(plan: Plan, uav: int) -> tuple[Fault, ...]:
-    """The faults of a UAV's actuators and their repairs, in order of time."""
+    """Return the faults of a UAV's actuators and their repairs, in order of time."""
     return tuple(
         Fault(
             f.at,
@@ -77,7 +80,7 @@ def actuator_faults(plan: Plan, uav: int) -> tuple[Fault, ...]:
 
 
 def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
-    """The faults of a UAV's navigation solution and their repairs, in order of time."""
+    """Return the faults of a UAV's navigation solution and their repairs, in order of time."""
     return tuple(
         NavigationFault(
             f.at,
@@ -94,12 +97,12 @@ def navigation_faults(plan: Plan, uav: int) -> tuple[NavigationFault, ...]:
 
 
 def fault_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
-    """Begin and end of each fault as (time, UAV, text)."""
+    """Return begin and end of each fault as (time s, UAV, text)."""
     return [(fault.at, fault.uav, _fault_text(fault)) for fault in _with_repairs(plan)]
 
 
 def _fault_text(fault: FaultFields) -> str:
-    """A fault in words, for the log."""
+    """Describe a fault, for the event log."""
     what = fault.actuator.replace("_", " ") if fault.actuator else f"navigation ({fault.navigation})"
     if fault.kind == "ok" or (fault.kind == "wrong" and fault.actuator and (fault.effectiveness, fault.bias) == (1, 0)):
         return f"{what} repaired"
@@ -113,10 +116,11 @@ def _fault_text(fault: FaultFields) -> str:
 def check_faults(
     plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
 ) -> None:
-    """Whether each fault leaves a level trim: (needed deflection - bias) / effectiveness within the travel.
+    """Refuse a fault without a level trim: (needed deflection - bias) / effectiveness must be within the travel.
 
-    At the mission's speed, or every speed that leaders are commanded to while it lasts if they change theirs; under the
-    disturbances that act then, of which those that oscillate count with their mean, 0, and in still air.
+    The trim is computed at the mission's speed or, if leaders change their speed, at each speed that they command
+    during the fault. It includes the disturbances of that time; an oscillating one counts with its mean, 0. The air is
+    still.
     """
     by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
     for n, fault in enumerate(plan.faults):

@@ -1,7 +1,7 @@
 """The fire of a scenario: each UAV's own reference, and whether its aircraft can fly it.
 
-Thrust cannot brake and has a limit. Where a post demands less than none or more than all of it, no law holds the
-formation: thrust rests at its limit and the error along the track grows by hundreds of metres.
+Thrust is never negative and has a limit. If a post needs negative thrust or more than the limit, no law holds the
+formation: thrust stays at its limit and the error along the track grows by hundreds of metres.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ __all__ = ["check_posts", "fire_commands", "fire_references", "fire_texts"]
 Array = NDArray[np.float64]
 
 _GRID_US = 100_000
-"""Spacing of the times at which a reference is looked at."""
+"""Sampling period of a reference, us."""
 _NARROW = 0.01
-"""Share of an actuator's travel, as a margin below which a flight is warned of."""
+"""A margin below this share of an actuator's travel gives a warning."""
 _FAR = 60.0
-"""A start so far from its post (m) was not tried."""
+"""Largest distance of a start from its post that was tested, m."""
 
 
 def fire_commands(plan: Plan) -> tuple[Command, ...]:
-    """Where the fire's centre is and drifts, from which time on; all UAVs know the same."""
+    """Return position and drift of the fire's centre over time; the same for all UAVs."""
     assert plan.fire is not None
     fire = plan.fire
     place = [fire.outbreak[axis] + fire.drift[axis] * fire.age for axis in range(2)]
@@ -53,7 +53,7 @@ def fire_commands(plan: Plan) -> tuple[Command, ...]:
 
 
 def fire_references(plan: Plan, followers: Sequence[int], findings: Findings) -> dict[int, OwnReference]:
-    """Each UAV's own reference."""
+    """Return each UAV's own reference, by id."""
     assert plan.fire is not None
     fire = plan.fire
     for uav in sorted({*fire.posts} ^ {*followers}):
@@ -81,7 +81,7 @@ def fire_references(plan: Plan, followers: Sequence[int], findings: Findings) ->
 
 
 def fire_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
-    """The fire's changes as events: time s, UAV (None: everybody), text."""
+    """Return the fire's changes as events: time s, UAV (None: all UAVs), text."""
     texts: list[tuple[float, int | None, str]] = []
     for event in plan.fire_events:
         parts = (
@@ -98,15 +98,16 @@ def fire_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
 
 @dataclass(frozen=True)
 class _Demand:
-    """What a post demands over time, before faults."""
+    """The demand of a post over time, without faults."""
 
     t: Array
+    """(n,): s."""
     motion: Array
     """(n, 15): see `Reference`."""
     speed: Array
-    """m/s."""
+    """(n,): m/s."""
     inputs: dict[str, Array]
-    """By actuator."""
+    """By actuator, (n,): N, load factor, rad."""
 
 
 def _demand_of(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: float) -> _Demand:
@@ -147,7 +148,7 @@ def _demand_of(own: OwnReference, vehicle: VehicleSpec, model: Any, duration: fl
 
 
 def _effectiveness_and_bias(t: Array, faults: Sequence[Fault], slot: int) -> tuple[Array, Array]:
-    """Effectiveness and bias of an actuator over time, as its latest fault has them."""
+    """Return effectiveness and bias of an actuator over time, from its latest fault."""
     effectiveness, bias = np.ones_like(t), np.zeros_like(t)
     for fault in sorted(faults):
         if int(fault.actuator) == slot:
@@ -168,9 +169,9 @@ def check_posts(
     model: Any,
     findings: Findings,
 ) -> None:
-    """Refuse posts that collide or that their aircraft cannot fly, with quantity and limit; warn if it can narrowly.
+    """Refuse posts that are too close together or that an aircraft cannot fly; warn of small margins.
 
-    ``laws`` are the limits of each UAV's own law, by actuator; of two limits the tighter one holds.
+    ``laws`` holds the limits of each UAV's law, by actuator. The narrower of the law's and the plant's limits counts.
     """
     assert plan.fire is not None
     found = {v.uav: _demand_of(references[v.uav], v, model, plan.duration) for v in vehicles}

@@ -1,4 +1,4 @@
-"""What a scenario gives the control laws: their gains, what they know at the start, and whether it suits them."""
+"""Input of the control laws: gains and initial values, and the schemes' own checks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["check_scheme", "gains_of", "initial_shared_values", "mission_values_
 
 
 def mission_values_for_gains(plan: Plan) -> dict[str, float]:
-    """What of the mission gains follow unless they are given, see ``airside.scheme.FOLLOWED``."""
+    """Return mission values that some gains take as their default, see ``airside.scheme.FOLLOWED``."""
     if not plan.leaders:
         return {}
     return {"leaders.z": math.fsum(leader.z for leader in plan.leaders.values()) / len(plan.leaders)}
@@ -33,9 +33,10 @@ def mission_values_for_gains(plan: Plan) -> dict[str, float]:
 def gains_of(
     scenario: Scenario, scheme: Scheme, findings: Findings, switches: Mapping[str, bool] | None = None
 ) -> dict[int, Any]:
-    """Each UAV's ``Gains``: of the form, of the scenario, its own, and what switches that are off change.
+    """Return each UAV's ``Gains``, by id; empty if they are refused.
 
-    ``switches`` are the scenario's unless given. Empty if they are refused.
+    Later values replace earlier ones: those of the form, of the scenario, of the UAV, and of switches that are off.
+    ``switches`` are those of the scenario unless given.
     """
     plan = scenario.plan
     followed = mission_values_for_gains(plan)
@@ -75,7 +76,7 @@ def check_scheme(
     references: Mapping[int, OwnReference | None],
     findings: Findings,
 ) -> Flight:
-    """The scheme's own conditions on gains and mission, which is returned; each follower's gains must meet them."""
+    """Check each follower's gains against the scheme's own conditions; return the `Flight` that the checks used."""
     speeds = {p.V for p in profiles.values()}
     speeds |= {command.speed for p in profiles.values() for command in p.commands}
     speeds |= {trigger.speed for p in profiles.values() for trigger in p.triggers}
@@ -96,7 +97,7 @@ def check_scheme(
         alike.setdefault(gains[uav], []).append(uav)
     found: dict[Problem, list[int]] = {}
     for chosen, uavs in alike.items():
-        # A condition on initial errors concerns those who fly with these gains.
+        # A condition on initial errors applies to the UAVs with these gains.
         concerned = replace(flight, initial={uav: flight.initial[uav] for uav in uavs})
         for problem in scheme.check(chosen, concerned):
             found.setdefault(problem, []).extend(uavs)
@@ -112,7 +113,10 @@ def check_scheme(
 def initial_shared_values(
     scheme: Scheme, vehicles: Iterable[VehicleSpec], profiles: Mapping[int, Profile]
 ) -> dict[int, tuple[float, ...]]:
-    """What each UAV's hearers know of it before they hear it, by id: its shared values at t = 0, accelerations as 0."""
+    """Return each UAV's shared values at t = 0, by id: its out-neighbours use them before its first record.
+
+    Accelerations are 0. Empty if the scheme needs no such values.
+    """
     if not scheme.briefed:
         return {}
     known = {}
@@ -129,7 +133,7 @@ def initial_shared_values(
 def _initial_errors(
     scheme: Scheme, vehicles: list[VehicleSpec], references: Mapping[int, OwnReference | None]
 ) -> dict[int, tuple[float, float, float]]:
-    """By UAV, where schemes refer to an attitude: by how much the first one is missed, rad."""
+    """Return the initial errors in bank, angle of attack and sideslip (rad) by UAV; {} unless the scheme tracks them."""
     errors = {}
     for vehicle in vehicles if scheme.plant == "attitude" else ():
         own, true = references[vehicle.uav], truth_at_start(vehicle)
@@ -140,7 +144,7 @@ def _initial_errors(
 
 
 def _motion(vehicle: VehicleSpec) -> Reference:
-    """The motion of an aircraft at its start."""
+    """Return the motion of an aircraft at its start."""
     true = truth_at_start(vehicle)
     speed, gamma = float(true[V]), float(true[GAMMA])
     climb, forward = speed * math.sin(gamma), speed * math.cos(gamma)

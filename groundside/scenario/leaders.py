@@ -1,4 +1,4 @@
-"""The leaders' profiles from a scenario: commands by time, by position, or by the obstacles that they detect."""
+"""The leaders' profiles: commands by time, by position, or by detected obstacles."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from ftcc.sim.trim import TrimError, steady_climb
 __all__ = ["check_clearance", "limit_climb_rates", "profiles_of"]
 
 _OF_THRUST = 0.99
-"""Share of the climb rate that the thrust can hold; the profile of chapter 6 uses nearly all of it."""
+"""Share of the climb rate that the thrust allows; the profile of chapter 6 uses nearly all of it."""
 _OF_ESTIMATES = 0.95
-"""Share of the climb rate that the followers' estimates can just follow."""
+"""Share of the largest climb rate that the followers' estimates can follow."""
 
 
 def profiles_of(plan: Plan, graph: Graph, findings: Findings) -> dict[int, Profile]:
-    """The profile of each leader, by id."""
+    """Return the profile of each leader, by id."""
     _check_reactions(plan, findings)
     findings.stop_if_refused()
     return {uav: _profile(plan, uav, graph, findings) for uav in graph.leaders}
@@ -87,7 +87,9 @@ def limit_climb_rates(
     estimates: float,
     findings: Findings,
 ) -> dict[int, Profile]:
-    """The profiles, held at what the followers can follow where the scenario gives no limit of its own.
+    """Return the profiles with climb and sink rates that the followers can follow.
+
+    A limit that the scenario gives stays.
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def limit_climb_rates(
     sheet, thrust
         The followers' aircraft, and their least and largest thrust, N.
     estimates
-        Climb rate that the followers' estimates can just follow, m/s.
+        Largest climb rate that the followers' estimates can follow, m/s.
     """
     if not profiles or plan.mission is None or not isinstance(sheet, AirframeSheet):
         return dict(profiles)
@@ -125,7 +127,7 @@ def limit_climb_rates(
 def _limit_in_force(
     uav: int, way: str, given: float, flown: float, thrust: float, estimates: float, findings: Findings
 ) -> float:
-    """The limit in force of one way, "climb" or "sink", m/s; ``given`` is inf where the scenario says nothing."""
+    """Return the limit of ``way``, "climb" or "sink", m/s; ``given`` is the scenario's limit, inf if it has none."""
     text = f"leaders.{uav}: its profile {way}s with {flown:.2f} m/s; the followers' thrust holds {thrust:.2f} m/s"
     if math.isfinite(estimates):
         text += f", their estimates follow {estimates:g} m/s"
@@ -140,7 +142,7 @@ def _limit_in_force(
 
 
 def check_clearance(plan: Plan, profiles: Mapping[int, Profile], findings: Findings) -> None:
-    """Warn of leaders whose profiles do not clear the obstacles."""
+    """Warn of profiles that pass below the top of an obstacle."""
     if not plan.obstacles:
         return
     for uav, rows in sampled(profiles, plan.duration, 0.1).items():
@@ -155,7 +157,7 @@ def check_clearance(plan: Plan, profiles: Mapping[int, Profile], findings: Findi
 
 
 def _check_reactions(plan: Plan, findings: Findings) -> None:
-    """What must be given for leaders that climb over obstacles."""
+    """Refuse leaders that climb over obstacles if a value that they need is missing."""
     reacting = [uav for uav, leader in plan.leaders.items() if leader.over_obstacles]
     for uav in reacting:
         given = len(plan.leaders[uav].over_obstacles)
@@ -170,9 +172,9 @@ def _check_reactions(plan: Plan, findings: Findings) -> None:
 
 
 def _triggers_over_obstacles(plan: Plan, uav: int) -> list[Trigger]:
-    """The commands by position of a leader that climbs over the obstacles.
+    """Return the position triggers of a leader that climbs over the obstacles.
 
-    The foremost leader detects an obstacle, the hindmost is the last to leave it behind, and all act on both.
+    All leaders climb when the first leader detects an obstacle, and descend when the last leader has passed it.
     """
     own, leaders = plan.leaders[uav], plan.leaders
     first = max(leaders, key=lambda leader: leaders[leader].x)

@@ -1,4 +1,4 @@
-"""What the link events of a scenario do to every directed edge and every radio."""
+"""Link events of a scenario, as changes of each directed edge and each radio."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _name(event: LinkEventFields) -> str:
 
 
 def link_texts(events: Sequence[LinkEventFields]) -> list[tuple[float, int | None, str]]:
-    """Begin and end of each event as (time, UAV, text)."""
+    """Return begin and end of each event as (time s, UAV, text)."""
     texts: list[tuple[float, int | None, str]] = []
     for event in events:
         name = _name(event)
@@ -38,7 +38,7 @@ def link_texts(events: Sequence[LinkEventFields]) -> list[tuple[float, int | Non
 
 
 def _edges(event: LinkEventFields, graph: Graph, where: str, refuse: Callable[[str], None]) -> list[tuple[int, int]]:
-    """The directed edges (receiver, sender) that an event touches; [] for a radio that is off."""
+    """Return the directed edges (receiver, sender) that an event changes; [] for a radio that is off."""
     if event.uav is not None:
         if event.uav not in graph.uavs:
             refuse(f"{where}.uav = {event.uav}: there is no such UAV; UAVs are {', '.join(map(str, graph.uavs))}")
@@ -55,10 +55,10 @@ def _edges(event: LinkEventFields, graph: Graph, where: str, refuse: Callable[[s
 def link_changes(
     events: Sequence[LinkEventFields], graph: Graph, base: Channel, refuse: Callable[[str], None]
 ) -> dict[int, list[LinkEvent]]:
-    """The changes that each UAV applies to its own radio and its in-edges, in order of time.
+    """Return the changes that each UAV applies to its radio and its in-edges, in order of time.
 
-    Events may overlap: an edge has at every time the base quality with all events of that time applied in the order
-    of the file, and is blocked while any cut lasts.
+    Events may overlap. The quality of an edge is then the base quality, changed by all events that last at that time,
+    in the order of the file. An edge is blocked while any cut lasts.
     """
     touched: dict[tuple[int, int | None], list[LinkEventFields]] = {}
     for n, event in enumerate(events):

@@ -1,7 +1,7 @@
-"""From a scenario to a mission: the specs of every process, checked as a whole.
+"""From a scenario to a mission: the spec of each process, checked as a whole.
 
-`resolve` is the way through this room, from top to bottom. Each step adds what it finds wrong to the `Findings`, so
-that a user sees all of it at once; it stops where the next step would rest on something that is refused.
+`resolve` calls the steps of this room in order. Each step adds errors and warnings to the `Findings`, so that a user
+sees all of them at once. `resolve` stops early where the next step depends on a refused value.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ __all__ = ["Mission", "resolve"]
 
 @dataclass(frozen=True)
 class Mission:
-    """Everything that a flight is made of, checked."""
+    """A checked flight plan, with the specs of all vehicles and autopilots."""
 
     name: str
     title: str
@@ -70,20 +70,20 @@ class Mission:
     """Form and variants, the key of the claims' expected values."""
     scheme: Scheme
     plant: str
-    """What the aircraft are, see ``sim.plants``."""
+    """Name of the aircraft's plant, see ``sim.plants``."""
     timing: Timing
     wire: bool
-    """States, commands and records pass through messages, and a command acts one sample late; False: ideal exchange."""
+    """True: states, commands and records are messages, and a command acts one sample later. False: ideal exchange."""
     graph: Graph
     obstacles: tuple[Obstacle, ...]
     vehicles: tuple[VehicleSpec, ...]
     """Followers, then leaders."""
     autopilots: tuple[AutopilotSpec, ...]
     claims: tuple[Claim, ...]
-    """Those of this case."""
+    """The claims of this case."""
     warnings: tuple[str, ...]
     toml: str
-    """The merged scenario as flown, with seed and versions: flies the same flight again."""
+    """The merged scenario as flown, with seed and versions: enough to repeat the flight."""
     home: tuple[float, float, float]
     """Latitude, longitude (deg) and altitude (m) of the origin of the local frame."""
     events: tuple[PlannedEvent, ...]
@@ -94,11 +94,11 @@ class Mission:
         return self.graph.uavs
 
     def toml_of_run(self, started: float) -> str:
-        """``toml`` with the Unix time (s) at which a run of it started: what stands in that run's folder."""
+        """Return ``toml`` with the Unix time (s) at which a run started, for the run's folder."""
         return f"{self.toml}\n[flown.run]\nstarted = {datetime.fromtimestamp(started, UTC).isoformat()}\n"
 
     def with_seed(self, seed: int) -> Mission:
-        """The same mission with other random numbers: noise, links, gusts and turbulence."""
+        """Return the same mission with other random numbers: noise, links, gusts and turbulence."""
         toml = tomli_w.dumps({**tomllib.loads(self.toml), "seed": seed})
         vehicles = tuple(
             replace(
@@ -112,7 +112,7 @@ class Mission:
 
     @property
     def fire(self) -> Fire | None:
-        """What the swarm flies around, as the first UAV knows it; all know the same but for their posts."""
+        """The fire, from the first UAV's reference; other UAVs differ only in their post. None without a fire."""
         own = self.autopilots[0].reference
         if self.scheme.plant != "position" or not isinstance(own, OwnReference):
             return None
@@ -120,12 +120,12 @@ class Mission:
 
 
 def resolve(scenario: Scenario) -> Mission:
-    """Check a scenario as a whole and turn it into specs.
+    """Check a scenario as a whole and return its specs.
 
     Raises
     ------
     ScenarioError
-        With all that is wrong.
+        With all errors that were found.
     """
     plan, findings = scenario.plan, Findings(scenario)
     basis = _basis(scenario, findings)
@@ -175,7 +175,7 @@ def resolve(scenario: Scenario) -> Mission:
 
 
 class _Basis(NamedTuple):
-    """What everything else in a mission rests on."""
+    """Parts of a mission that all other parts depend on."""
 
     scheme: Scheme
     wire: bool
@@ -214,7 +214,7 @@ def _check_flyable(
     model: Model,
     findings: Findings,
 ) -> None:
-    """Whether aircraft, healthy and faulty, have the travel that start, disturbances and references ask for."""
+    """Refuse aircraft, healthy or faulty, whose travel is too small for start, disturbances or references."""
     check_starts(plan, basis.plant, vehicles, findings)
     if plan.fire is None:
         check_trims(plan, basis.plant, vehicles, profiles, findings)
@@ -235,7 +235,7 @@ def _prepare_guidance(
     gains: Mapping[int, Any],
     findings: Findings,
 ) -> tuple[Flight, dict[int, Profile]]:
-    """What the laws know before take-off, and the leaders' profiles, limited to what the followers can follow."""
+    """Check the laws, and limit the leaders' profiles to what the followers can follow; return flight and profiles."""
     flight = check_scheme(
         plan, basis.scheme, gains, basis.graph, basis.timing, vehicles, profiles, references, findings
     )
@@ -248,7 +248,7 @@ def _prepare_guidance(
 def _tolerant_gains(
     scenario: Scenario, scheme: Scheme, gains: Mapping[int, Any], findings: Findings
 ) -> Mapping[int, Any]:
-    """The gains with fault tolerance, for a flight that begins without it and may get it by a command."""
+    """Return the gains with fault tolerance, for a flight that begins without it; a command may switch it on."""
     switches = scenario.plan.switches
     if switches.get(FAULT_TOLERANCE) is not False:
         return gains
@@ -256,7 +256,7 @@ def _tolerant_gains(
 
 
 def _check_recorded_columns(plan: Plan, basis: _Basis, findings: Findings) -> None:
-    """Claims and tracking errors must speak of recorded columns."""
+    """Refuse claims and tracking errors that use columns which are not recorded."""
     clearance = ["clearance"] if plan.obstacles else []
     signals = (quantity.name for quantity in basis.scheme.signals)
     names = (*leading_columns(basis.plant.ACTUATORS), *clearance, *signals)
@@ -277,7 +277,7 @@ def _autopilots(
     channel: Channel,
     changes: Mapping[int, Sequence[LinkEvent]],
 ) -> tuple[AutopilotSpec, ...]:
-    """The spec of each vehicle's autopilot."""
+    """Return the spec of each vehicle's autopilot."""
     graph, scheme = basis.graph, basis.scheme
     initial = initial_shared_values(scheme, vehicles, profiles)
     # Laws for the vertical plane fly north.

@@ -1,4 +1,4 @@
-"""What a UAV refers to by itself, from a scenario: the mission's speed, or attitude commands."""
+"""Each UAV's own reference: the mission's speed, attitude commands, or a post around the fire."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ftcc.link.timing import Timing
 __all__ = ["own_references", "reference_texts"]
 
 _TABLES = {"longitudinal": "mission", "attitude": "attitude", "position": "fire"}
-"""The table of the scenario that says what a UAV refers to by itself, by the scheme's plant."""
+"""The scenario's table with the UAVs' own references, by the scheme's plant."""
 
 
 def own_references(
     plan: Plan, plant: str, followers: Sequence[int], timing: Timing, findings: Findings
 ) -> dict[int, OwnReference]:
-    """What each UAV refers to by itself, by id; leaders refer to their profiles."""
+    """Return each UAV's own reference, by id; leaders also track their profiles."""
     for kind, table in _TABLES.items():
         given = getattr(plan, table) is not None
         if kind == plant and not given:
@@ -76,7 +76,7 @@ def _attitude(plan: Plan, uav: int, timing: Timing, findings: Findings) -> OwnRe
 
 
 def reference_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
-    """The commands as events: time s, UAV (None: everybody), text."""
+    """Return the commands as events: time s, UAV (None: all UAVs), text."""
     events = fire_texts(plan)
     for command in plan.attitude.commands if plan.attitude else ():
         asked = [

@@ -1,4 +1,4 @@
-"""What is planned to happen in a flight: the entries of its event log that the scenario itself makes."""
+"""Planned events: the entries of the event log that follow from the scenario."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ftcc.groundside.schema import Plan
 __all__ = ["PlannedEvent", "planned_events"]
 
 PlannedEvent = tuple[float, int | None, str, str]
-"""Time s, UAV (None: everybody), severity, text: a command is "info", a fault or a disturbance a "warning"."""
+"""Time s, UAV (None: all UAVs), severity, text: "info" for a command, "warning" for a fault or a disturbance."""
 
 
 def planned_events(plan: Plan, plant: ModuleType) -> tuple[PlannedEvent, ...]:
-    """In the order of time."""
+    """Return the planned events in order of time."""
     commands = [*_leader_texts(plan), *reference_texts(plan)]
     warnings = [
         *fault_texts(plan),

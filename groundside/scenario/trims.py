@@ -1,4 +1,4 @@
-"""Whether healthy aircraft can fly where the scenario starts and disturbs them: within the model, and within travel."""
+"""Checks of healthy aircraft: the start is within the model, and the travel is enough for level flight."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ _GUARDED = {
     INCIDENCE: ("alpha", "angle_of_attack"),
     SIDESLIP: ("beta", "sideslip"),
 }
-"""The quantity and the guard behind each reason for which an aircraft is lost."""
+"""Quantity and guard of each reason for which an aircraft is lost."""
 
 
 def truth_at_start(vehicle: VehicleSpec) -> NDArray[np.float64]:
-    """The state of an aircraft at its start, in the order of ``TRUTH``."""
+    """Return the state of an aircraft at its start, in the order of ``TRUTH``."""
     plant = plants.find(vehicle.plant)
     true = np.zeros(len(TRUTH))
     plant.truth(plant.State(*vehicle.initial), plant.Inputs(*vehicle.command), vehicle.offset, true)
@@ -49,7 +49,7 @@ def truth_at_start(vehicle: VehicleSpec) -> NDArray[np.float64]:
 def level_trim(
     plant: ModuleType, airframe: Any, V: float, where: str, findings: Findings, **disturbances: float
 ) -> dict[str, float]:
-    """Level flight at ``V`` under disturbances, by name; refused, and empty, where there is none."""
+    """Return the level trim at ``V`` (m/s) under disturbances, by actuator; refuse, and return {}, if there is none."""
     try:
         return dict(plant.level(airframe, V, **disturbances)._asdict())
     except TrimError as error:
@@ -58,7 +58,10 @@ def level_trim(
 
 
 def disturbances_at(vehicle: VehicleSpec, plant: ModuleType, at: float) -> dict[str, float]:
-    """The disturbances of a vehicle at ``at`` (s) by name, as set in; those that oscillate count with their mean, 0."""
+    """Return a vehicle's disturbances at ``at`` (s), by name, after their onset.
+
+    An oscillating disturbance counts with its mean, 0.
+    """
     return {
         name: sum(
             d.value
@@ -70,9 +73,9 @@ def disturbances_at(vehicle: VehicleSpec, plant: ModuleType, at: float) -> dict[
 
 
 def speeds_at(plan: Plan, profiles: dict[int, Profile], uav: int, at: float) -> set[float]:
-    """The airspeeds (m/s) at which a UAV must be able to fly level at ``at`` (s).
+    """Return the airspeeds (m/s) at which a UAV must be able to fly level at ``at`` (s).
 
-    Those that the leaders are commanded to, if they ever change; else the mission's, or that of its start.
+    They are the leaders' commanded speeds, if these change; else the mission's speed, or the UAV's initial speed.
     """
     speeds = {speed for p in profiles.values() for speed in (p.V, *(command.speed for command in p.commands))}
     if len(speeds) > 1:
@@ -86,14 +89,14 @@ def speeds_at(plan: Plan, profiles: dict[int, Profile], uav: int, at: float) -> 
 def times_to_check(
     plan: Plan, profiles: dict[int, Profile], vehicle: VehicleSpec, begin: float, end: float
 ) -> list[float]:
-    """``begin`` and the later times before ``end`` (s) at which another level flight is asked of a vehicle."""
+    """Return ``begin`` and the times before ``end`` (s) at which a vehicle's speed or disturbance changes."""
     times = {command.at for p in profiles.values() for command in p.commands}
     times |= {time for disturbance in vehicle.disturbances for time in (disturbance.time, disturbance.until)}
     return sorted({begin} | {t for t in times if begin < t < min(end, plan.duration)})
 
 
 def check_starts(plan: Plan, plant: ModuleType, vehicles: Iterable[VehicleSpec], findings: Findings) -> None:
-    """Refuse initial states at which an aircraft is lost at once, and actuators that start beyond their travel."""
+    """Refuse initial states beyond the guards, and actuators that start beyond their travel."""
     for vehicle in vehicles:
         if vehicle.kind != "aircraft" or math.isnan(sum(vehicle.initial)):
             continue
@@ -118,7 +121,7 @@ def check_starts(plan: Plan, plant: ModuleType, vehicles: Iterable[VehicleSpec],
 def check_trims(
     plan: Plan, plant: ModuleType, vehicles: Iterable[VehicleSpec], profiles: dict[int, Profile], findings: Findings
 ) -> None:
-    """Refuse a healthy aircraft that cannot fly level within its travel: at its start, under each disturbance."""
+    """Refuse a healthy aircraft that cannot fly level within its travel, at its start or under a disturbance."""
     report = findings.warn if plan.plant.beyond_limits else findings.refuse
     problems: dict[str, list[int]] = {}
     for vehicle in vehicles:
@@ -132,7 +135,7 @@ def check_trims(
 def _first_beyond_travel(
     plan: Plan, plant: ModuleType, vehicle: VehicleSpec, profiles: dict[int, Profile], findings: Findings
 ) -> str:
-    """What a healthy aircraft would first need beyond its travel; empty if it can always fly level."""
+    """Describe the first level trim beyond a healthy aircraft's travel; "" if there is none."""
     for at in times_to_check(plan, profiles, vehicle, 0.0, math.inf):
         for speed in sorted(speeds_at(plan, profiles, vehicle.uav, at)):
             where = f"UAV {vehicle.uav} at t = {at:g} s"

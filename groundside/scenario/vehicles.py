@@ -1,4 +1,4 @@
-"""The aircraft of a scenario: the truth that flies, what the laws know of it, and the spec of each vehicle."""
+"""The vehicles of a scenario: true airframe, nominal model for the laws, and the spec of each vehicle."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ftcc.sim.spec import VehicleSpec
 __all__ = ["nominal_model", "true_airframe", "vehicles_of"]
 
 Limits = tuple[tuple[float, float], ...]
-"""Least and largest of each actuator, by slot."""
+"""(lowest, highest) of each actuator, by slot."""
 
 
 def vehicles_of(
@@ -44,7 +44,7 @@ def vehicles_of(
     timing: Timing,
     findings: Findings,
 ) -> list[VehicleSpec]:
-    """Specs of the followers' aircraft, then of the leaders' reference points."""
+    """Return the specs of the followers' aircraft, then of the leaders' reference points."""
     code = _attitude_code(model, plant)
     vehicles = [_aircraft(plan, uav, plant, airframe, limits, code, timing, findings) for uav in graph.followers]
     vehicles += [_reference_point(plan, uav, plant, airframe, limits, profiles[uav]) for uav in graph.leaders]
@@ -53,7 +53,7 @@ def vehicles_of(
 
 
 def nominal_model(plan: Plan, sheet: AirframeSheet | PointMassSheet, limits: Limits) -> Model:
-    """What the laws know of the aircraft."""
+    """Return the nominal model of the aircraft, which the laws use."""
     values = dict.fromkeys(Model._fields, 0.0)
     if isinstance(sheet, PointMassSheet):
         # (9.32) as a polar over the lift coefficient.
@@ -69,7 +69,7 @@ def nominal_model(plan: Plan, sheet: AirframeSheet | PointMassSheet, limits: Lim
 def true_airframe(
     plan: Plan, sheet: AirframeSheet | PointMassSheet, plant: ModuleType, findings: Findings
 ) -> tuple[float, ...]:
-    """The true parameters of the plant."""
+    """Return the true parameters of the plant."""
     missing = [name for name in plant.Parameters._fields if name not in type(sheet).model_fields]
     if missing:
         findings.refuse(f"airframe = {plan.airframe!r}: lacks {', '.join(missing)}, which the plant needs")
@@ -150,14 +150,14 @@ def _aircraft(
 
 
 def _attitude_code(model: Model, plant: ModuleType) -> AttitudeCode:
-    """How commands travel as attitude targets, if the plant takes them so."""
+    """Return how a command is encoded as an attitude target; ``UNCODED`` if the plant takes actuator commands."""
     if not getattr(plant, "BY_ATTITUDE", False):
         return UNCODED
     return AttitudeCode(2.0 * model.m * model.g / (model.rho * model.S), model.CL0, model.CLa)
 
 
 def _disturbances(plan: Plan, plant: ModuleType, uav: int) -> tuple[Disturbance, ...]:
-    """Those of the scenario that act on a UAV, by time, and its mean wind."""
+    """Return the disturbances that act on a UAV, in order of time, then its mean wind."""
     channels = [name for name, _ in plant.DISTURBANCES]
     planned = tuple(
         Disturbance(

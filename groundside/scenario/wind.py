@@ -1,4 +1,4 @@
-"""The moving air of a scenario: what its winds, gusts and turbulence are to each vehicle."""
+"""The moving air of a scenario: wind, gusts and turbulence of each vehicle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FOOT = 0.3048
 
 
 def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
-    """Refuse moving air where the plant has none, and gusts of UAVs that are no followers."""
+    """Refuse moving air if the plant has none, and gusts for UAVs that are no followers."""
     channels = [name for name, _ in plant.DISTURBANCES]
     for table, needed in (("wind", ("wind", "gust")), ("gusts", AIR), ("turbulence", AIR)):
         if getattr(plan, table) and not {*needed} <= {*channels}:
@@ -31,21 +31,21 @@ def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
 
 
 def mean_wind(plan: Plan, channels: list[str]) -> tuple[Disturbance, ...]:
-    """The mean wind of (9.33)."""
+    """Return the mean wind of (9.33)."""
     if plan.wind is None or plan.wind.mean == 0.0 or "wind" not in channels:
         return ()
     return (Disturbance(0.0, float(channels.index("wind")), plan.wind.mean, 0.0),)
 
 
 def gust(plan: Plan) -> Gust:
-    """The gust of (9.33)."""
+    """Return the gust of (9.33)."""
     if plan.wind is None:
         return Gust()
     return Gust(plan.wind.gust, round(plan.wind.gust_period * 1e6), plan.seed)
 
 
 def discrete_gusts(plan: Plan, uav: int, V: float, findings: Findings) -> tuple[DiscreteGust, ...]:
-    """The gusts that UAV ``uav`` flies into, which starts with ``V`` (m/s)."""
+    """Return the discrete gusts of UAV ``uav``, whose initial airspeed is ``V`` (m/s)."""
     found = []
     for n, fields in enumerate(plan.gusts):
         if fields.uavs is not None and uav not in fields.uavs:
@@ -63,7 +63,7 @@ def discrete_gusts(plan: Plan, uav: int, V: float, findings: Findings) -> tuple[
 
 
 def turbulence(plan: Plan, uav: int, V: float, timing: Timing) -> Turbulence:
-    """The turbulence that UAV ``uav`` flies in, which starts with ``V`` (m/s)."""
+    """Return the turbulence of UAV ``uav``, whose initial airspeed is ``V`` (m/s)."""
     fields = plan.turbulence
     if fields is None or (fields.uavs is not None and uav not in fields.uavs):
         return NO_TURBULENCE
@@ -81,12 +81,14 @@ def _sizes(fields: TurbulenceFields) -> tuple[tuple[float, float, float], tuple[
 
 
 def low_altitude(wind: float, altitude: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Standard deviations (m/s) and lengths (m), along, right, up, below 1000 ft (MIL-F-8785C, 3.7.3.4, figs. 10, 11).
+    """Return standard deviations (m/s) and scale lengths (m) along, right, up, below 1000 ft.
+
+    Source: MIL-F-8785C, 3.7.3.4, figs. 10, 11.
 
     Parameters
     ----------
     wind : float
-        At 20 ft above the ground, m/s.
+        Wind speed at 20 ft above the ground, m/s.
     altitude : float
         Above the ground, m.
     """
@@ -98,7 +100,7 @@ def low_altitude(wind: float, altitude: float) -> tuple[tuple[float, float, floa
 
 
 def wind_texts(plan: Plan) -> list[tuple[float, int | None, str]]:
-    """Begin and end of each discrete gust as (time, UAV, text)."""
+    """Return begin and end of each discrete gust as (time s, UAV, text)."""
     texts: list[tuple[float, int | None, str]] = []
     for fields in plan.gusts:
         parts = [f"{name} {getattr(fields, name):g} m/s" for name in ("along", "right", "up") if getattr(fields, name)]
