@@ -133,7 +133,7 @@ def initial_shared_values(
 def _initial_errors(
     scheme: Scheme, vehicles: list[VehicleSpec], references: Mapping[int, OwnReference | None]
 ) -> dict[int, tuple[float, float, float]]:
-    """Return the initial errors in bank, angle of attack and sideslip (rad) by UAV; {} unless the scheme tracks them."""
+    """Return initial errors in bank, angle of attack and sideslip (rad) by UAV; {} unless the scheme tracks them."""
     errors = {}
     for vehicle in vehicles if scheme.plant == "attitude" else ():
         own, true = references[vehicle.uav], truth_at_start(vehicle)
