@@ -1,4 +1,4 @@
-"""Claims: what a scenario says that its flight shows, held against what was recorded."""
+"""Claims: numbers that a flight must show, compared with its recording."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TOLERANCE = re.compile(
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a value may be from the expected one."""
+    """Largest distance of a value from the expected one, or a bound."""
 
     text: str
     bound: str
@@ -41,17 +41,17 @@ class Tolerance:
     unit: str
     """"%": of the expected value; "x" (bounds only): times the expected value; "": as it stands."""
     least: float = 0.0
-    """What a band of so many % is at least."""
+    """Least half-width of a band in %, in the unit of the value."""
 
     def allows(self, value: float, expected: float) -> bool:
-        """Whether ``value`` is within the tolerance."""
+        """Return whether ``value`` is within the tolerance."""
         if not math.isfinite(value):
             return False
         if self.bound:
             limit = self.size * abs(expected) if self.unit == "x" else self.size
             return value < limit if self.bound == "<" else value > limit
         width = max(self.size / 100.0 * abs(expected), self.least) if self.unit == "%" else self.size
-        # Expected values are decimal: a value on the edge of the band is within it.
+        # Expected values are decimal: the edge of the band belongs to it.
         return abs(value - expected) <= width * (1.0 + 1e-12)
 
 
@@ -80,12 +80,12 @@ def tolerance_of(text: str) -> Tolerance:
 
 @dataclass(frozen=True)
 class Result:
-    """A claim held against a flight."""
+    """A claim and the value that the flight shows."""
 
     claim: Claim
     uavs: tuple[int, ...]
     value: float | list[float] | None
-    """None where the flight did not cover the window, or gave no finite number."""
+    """None if the flight did not cover the window, or gave no finite number."""
     expected: float | list[float]
     tolerance: str
     ok: bool | None
@@ -93,7 +93,7 @@ class Result:
     remark: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """For ``ftcc report --json``."""
+        """Return the result as ``ftcc report --json`` prints it."""
         return {
             "name": self.claim.name,
             "uavs": list(self.uavs),
@@ -108,17 +108,19 @@ class Result:
 
 
 def by_case(entry: Any, case: str) -> Any:
+    """Return an entry's value for ``case``, or its "default"; an entry that is no table holds for all cases."""
     return entry.get(case, entry.get("default")) if isinstance(entry, Mapping) else entry
 
 
 def uavs_of(claim: Claim, graph: Graph) -> tuple[int, ...]:
+    """Return the ids of the UAVs that a claim is about."""
     if isinstance(claim.uavs, str):
         return {"followers": graph.followers, "leaders": graph.leaders, "all": graph.uavs}[claim.uavs]
     return tuple(claim.uavs)
 
 
 def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) -> list[str]:
-    """What is wrong with the claims of a scenario."""
+    """Return the errors in the claims of a scenario."""
     problems = []
     led = bool(graph.leaders) and set(graph.followers) <= graph.reached_from(graph.leaders)
     for n, claim in enumerate(claims):
@@ -157,10 +159,10 @@ def check_claims(claims: Iterable[Claim], graph: Graph, columns: Sequence[str]) 
 def evaluate(
     signals: Signals, claims: Iterable[Claim], case: str, graph: Graph, duration: float = math.inf
 ) -> list[Result]:
-    """Hold all claims of ``case`` against a recording of a flight of ``duration`` seconds.
+    """Compare all claims of ``case`` with the recording of a flight of ``duration`` seconds.
 
-    A window is covered if the recording of any UAV reaches its end; a claim about a UAV lost before then fails, unless
-    its metric tells of losses.
+    A window is covered if the recording of any UAV reaches its end. A claim about a UAV that was lost before that time
+    fails, unless its metric is also defined for a lost UAV.
     """
     end = max(
         (float(signals.column("t", uav)[-1]) for uav in signals.uavs if len(signals.column("t", uav))), default=-1.0
@@ -169,7 +171,7 @@ def evaluate(
 
 
 def failed(results: Iterable[Result]) -> list[Result]:
-    """Those that do not hold."""
+    """Return the results of claims that do not hold."""
     return [result for result in results if result.ok is False]
 
 

@@ -1,12 +1,15 @@
-"""Expressions over the columns of a recording, as claims, figures and schemes name what they speak of.
+"""Expressions over the columns of a recording; claims, figures and schemes use them.
 
-An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``; ``z[4]`` is the z of UAV 4 at the
-same times, ``total(z)`` and ``largest(z)`` are taken over all followers, ``disagreement(z)`` = sum_j a_ij (z_i - z_j)
-over those whom a follower hears. Angles are recorded within half a turn: ``wrapped(mu - mu_d)`` is a difference of them
-(rad) the shorter way around, ``turn_disagreement(mu)`` is the disagreement of such differences. Beside the recorded
-columns there are, for followers of a graph with leaders, ``x_d`` and ``z_d`` (the position and altitude that its hull
-weights give it), ``hull_distance`` (how far it is above or below all leaders) and ``hull_distance_x`` (how far ahead of
-or behind them).
+An expression is arithmetic over column names, such as ``z - z_d`` or ``abs(S1) / 2``:
+
+- ``z[4]`` is the z of UAV 4 at the same times.
+- ``total(z)`` and ``largest(z)`` are taken over all followers.
+- ``disagreement(z)`` is sum_j a_ij (z_i - z_j) over the in-neighbours j of follower i.
+- Angles are recorded within half a turn. ``wrapped(mu - mu_d)`` is a difference within half a turn (rad), and
+  ``turn_disagreement(mu)`` is the disagreement of such differences.
+
+With leaders in the graph, followers have further columns: ``x_d`` and ``z_d`` are position and altitude from the hull
+weights; ``hull_distance`` is the distance above or below all leaders, ``hull_distance_x`` that ahead of or behind them.
 """
 
 from __future__ import annotations
@@ -40,7 +43,7 @@ Array = NDArray[np.float64]
 
 _PLACES = {"x_d": "x", "z_d": "z"}
 _DISTANCES = {"hull_distance_x": "x", "hull_distance": "z"}
-"""Derived columns, and the recorded one of the leaders that they are made of."""
+"""Derived columns, and the leaders' recorded column from which each is computed."""
 
 DERIVED = {
     "x_d": "forward position of the containment point, m",
@@ -50,7 +53,7 @@ DERIVED = {
 }
 
 CLOSE = 1e-9
-"""Rounding of times, s."""
+"""Tolerance for equal times, s."""
 
 
 class Signals(Protocol):
@@ -69,15 +72,15 @@ class Signals(Protocol):
 
 
 def wrapped(angle: Array) -> Array:
-    """Angles (rad) within half a turn of 0, as ``link.rotation.wrapped``; one that is stays what it is, bit for bit."""
+    """Return angles (rad) within half a turn of 0, as ``link.rotation.wrapped``; those within it keep their bits."""
     away = (np.abs(angle) > np.pi) & np.isfinite(angle)
     return angle - 2.0 * np.pi * np.floor((np.where(away, angle, 0.0) + np.pi) / (2.0 * np.pi))
 
 
 def unwrapped(angle: Array, turn: float = 2.0 * math.pi, beside: Array | None = None) -> Array:
-    """A curve of angles without jumps of a ``turn`` (in the unit of ``angle``); where it is nan, it goes on behind.
+    """Return a curve of angles without jumps of a ``turn`` (in the unit of ``angle``); nan values stay.
 
-    It begins with the first angle, or, where another curve is given, within half a turn ``beside`` that one.
+    The curve begins with the first angle or, if another curve is given, within half a turn of ``beside``.
     """
     found = np.array(angle, np.float64)
     there = np.isfinite(found)
@@ -134,7 +137,7 @@ _SWARM_FUNCTIONS: dict[str, Callable[[Array, int, Graph], Array]] = {
     "disagreement": _disagreement,
     "turn_disagreement": functools.partial(_disagreement, difference=wrapped),
 }
-"""Of the values of all followers (followers, n), seen by the i-th."""
+"""Functions of the values of all followers (followers, n), for the i-th follower."""
 
 
 @functools.cache
@@ -147,7 +150,7 @@ def _parse(expression: str) -> ast.expr:
 
 @functools.cache
 def names_in(expression: str) -> frozenset[str]:
-    """The column names that an expression uses.
+    """Return the column names that an expression uses.
 
     Raises
     ------
@@ -180,7 +183,7 @@ def names_in(expression: str) -> frozenset[str]:
 
 
 def _subscript(expression: str, node: ast.Subscript) -> tuple[str, int]:
-    """Column and UAV of ``z[4]``."""
+    """Return column and UAV of ``z[4]``."""
     name, uav = node.value, node.slice
     if isinstance(name, ast.Name) and isinstance(uav, ast.Constant) and type(uav.value) is int:
         return name.id, uav.value
@@ -188,13 +191,13 @@ def _subscript(expression: str, node: ast.Subscript) -> tuple[str, int]:
 
 
 def uavs_in(expression: str) -> set[int]:
-    """The UAVs that an expression names."""
+    """Return the UAVs that an expression names."""
     subscripts = (node for node in ast.walk(_parse(expression)) if isinstance(node, ast.Subscript))
     return {_subscript(expression, node)[1] for node in subscripts}
 
 
 def check_expression(expression: str, columns: Iterable[str]) -> None:
-    """Raise `ValueError`, naming what there is, if an expression is none or uses a column that does not exist."""
+    """Raise `ValueError` if an expression is not valid or uses an unknown column; the message names the known ones."""
     known = [*columns, *DERIVED]
     unknown = sorted(names_in(expression) - set(known))
     if unknown:
@@ -202,7 +205,7 @@ def check_expression(expression: str, columns: Iterable[str]) -> None:
 
 
 def evaluate_expression(expression: str, signals: Signals, graph: Graph, uav: int) -> Array:
-    """An expression for one UAV, at all its recorded times."""
+    """Return the values (n,) of an expression for one UAV, at all its recorded times."""
     t = signals.column("t", uav)
     with np.errstate(all="ignore"):
         result = np.asarray(_value(_parse(expression), signals, graph, uav), np.float64)
@@ -243,7 +246,7 @@ def _value(expression: ast.expr, signals: Signals, graph: Graph, uav: int) -> An
 
 
 def _values_at(t: Array, times: Array, values: Array) -> Array:
-    """``values`` of ``times`` at the times ``t``; nan where there is none."""
+    """Return ``values``, given at ``times``, at the times ``t``; nan where there is none."""
     if np.array_equal(t, times):
         return values
     found = np.full(len(t), np.nan)
@@ -270,7 +273,7 @@ def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
 
 
 def _leader_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Array:
-    """A column of the leaders at times ``t``, shape (leaders, n); nan where a leader was not recorded."""
+    """Return a column of the leaders at times ``t`` (leaders, n); nan where a leader was not recorded."""
     try:
         graph.require(Assumption.LEADERS_REACH_ALL)
     except GraphError as error:
@@ -279,6 +282,6 @@ def _leader_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Arra
 
 
 def window_of(t: Array, window: tuple[float, float]) -> slice:
-    """The rows within a window, both ends included."""
+    """Return the rows within a window, both ends included."""
     first = int(np.searchsorted(t, window[0] - CLOSE))
     return slice(first, int(np.searchsorted(t, window[1] + CLOSE)))

@@ -1,4 +1,4 @@
-"""Metrics by name: one number from the values of an expression within a window."""
+"""Metrics by name: each computes one number from the values of an expression within a window."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metric:
-    """A number from the rows of one UAV, and how the UAVs' numbers become one."""
+    """A number from the rows of one UAV, and how the numbers of several UAVs are combined."""
 
     function: Callable[[Array, Array, float], float]
-    """(times, values, threshold) -> number; all within the window."""
+    """(times (n,) in s, values (n,), threshold) -> number, from the rows within the window."""
     across: str
     """"max" or "min" over the UAVs, or "farthest": that of the UAV farthest from the expected value."""
     meaning: str
     threshold: bool = False
-    """Whether it needs one."""
+    """Whether the metric needs a threshold."""
     survives_loss: bool = False
-    """Whether it says something of a UAV that is lost within the window."""
+    """Whether the metric is also defined for a UAV that is lost within the window."""
 
 
 def _time_until_below(t: Array, x: Array, threshold: float) -> float:

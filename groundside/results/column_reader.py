@@ -58,7 +58,7 @@ class ColumnReader:
 
     @functools.cached_property
     def _rows(self) -> dict[int, int]:
-        """How many rows there are of each UAV, by id, ascending."""
+        """Number of rows of each UAV, by id, ascending."""
         rows: dict[int, int] = {}
         for group in range(self._open.num_row_groups):
             for uav, count in zip(*np.unique(self._group(group, ["uav"])[0], return_counts=True), strict=True):
@@ -66,26 +66,26 @@ class ColumnReader:
         return dict(sorted(rows.items()))
 
     def _group(self, group: int, names: list[str]) -> list[NDArray[Any]]:
-        """Columns of a group of rows, all UAVs together."""
+        """Read columns of one row group, for all UAVs together."""
         table = self._readable(lambda: self._open.read_row_group(group, columns=names))
         return [table.column(name).to_numpy() for name in names]
 
     def _read(self, name: str, uavs: Sequence[int]) -> dict[int, NDArray[Any]]:
-        """A column of some UAVs, each in order of time. No more than a group of rows is there of the others."""
+        """Read a column of some UAVs, each in order of time. At most one row group of other UAVs is in memory."""
         found = {
             uav: np.empty(self._rows[uav], self._open.schema_arrow.field(name).type.to_pandas_dtype()) for uav in uavs
         }
         filled = dict.fromkeys(uavs, 0)
-        everybody = np.array(list(self._rows))
-        k = len(everybody)
+        all_uavs = np.array(list(self._rows))
+        k = len(all_uavs)
         for group in range(self._open.num_row_groups):
             values, whose = self._group(group, [name, "uav"])
-            if len(whose) % k == 0 and (whose.reshape(-1, k) == everybody).all():
-                # As it mostly is: everybody has a row at every time.
+            if len(whose) % k == 0 and (whose.reshape(-1, k) == all_uavs).all():
+                # The usual case: every UAV has a row at every time.
                 parts = [values[n::k] for n in range(k)]
             else:
                 order = np.argsort(whose, kind="stable")
-                parts = np.split(values[order], np.searchsorted(whose[order], everybody[1:]))
+                parts = np.split(values[order], np.searchsorted(whose[order], all_uavs[1:]))
             for uav, part in zip(self._rows, parts, strict=True):
                 if uav in found:
                     found[uav][filled[uav] : filled[uav] + len(part)] = part
@@ -93,7 +93,7 @@ class ColumnReader:
         return found
 
     def _readable(self, read: Callable[[], Any]) -> Any:
-        """What ``read`` gives, or a message that says which file is damaged and what may help."""
+        """Return what ``read`` returns; raise `RunError`, which names the damaged file, if it fails."""
         import pyarrow as pa
 
         try:
@@ -119,7 +119,7 @@ class ColumnReader:
         if uav not in self._rows:
             return np.empty(0)
         if (name, uav) not in self._cache:
-            # Of a short flight, others will be asked for next; of a long one, there is no room for theirs.
+            # In a short flight, read all UAVs: they are needed next. In a long one they do not fit.
             small = 8 * self._open.metadata.num_rows <= _MEMORY / 4
             for one, values in self._read(name, list(self._rows) if small else [uav]).items():
                 self._cache[name, one] = values

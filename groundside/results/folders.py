@@ -1,4 +1,4 @@
-"""Folders of results: a new one for each run, and one process at a time that writes into it."""
+"""Folders of results: a new one for each run, locked for the process that writes into it."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from ftcc.groundside.errors import UserError
 __all__ = ["BusyFolderError", "NothingRecordedError", "RunError", "new_folder", "sole_writer"]
 
 _locks: dict[tuple[int, int], int] = {}
-"""Descriptors of the folders that this process keeps to its end, by device and inode."""
+"""Descriptors of the folders that this process locked until its exit, by (device, inode)."""
 
 
 class BusyFolderError(UserError):
-    """Another process writes into the folder."""
+    """Another process is writing into the folder."""
 
 
 class RunError(UserError):
-    """A folder that is no run, or a run that cannot be read."""
+    """A folder is not a run, or the run cannot be read."""
 
 
 class NothingRecordedError(RunError):
-    """A run that ended before anything was recorded."""
+    """A run ended before anything was recorded."""
 
 
 @contextlib.contextmanager
 def sole_writer(folder: Path) -> Iterator[None]:
-    """Be the only process that writes into ``folder``, which is created.
+    """Create ``folder`` if necessary, and lock it for this process within the ``with`` block.
 
     Raises
     ------
     BusyFolderError
-        If another one does.
+        If another process holds the lock.
     OSError
         If it cannot be created.
     """
@@ -50,7 +50,7 @@ def sole_writer(folder: Path) -> Iterator[None]:
 
 
 def lock_until_exit(folder: Path) -> None:
-    """As `sole_writer`, of a folder that is there, until this process ends, however it ends."""
+    """Lock an existing folder until this process ends in any way."""
     status = folder.stat()
     place = status.st_dev, status.st_ino
     if place not in _locks:
@@ -58,7 +58,7 @@ def lock_until_exit(folder: Path) -> None:
 
 
 def _lock(folder: Path) -> int:
-    """A descriptor that holds the kernel's lock on a folder. It leaves no file behind."""
+    """Lock a folder; return the descriptor that holds the kernel's lock. The lock leaves no file behind."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -66,19 +66,19 @@ def _lock(folder: Path) -> int:
         os.close(descriptor)
         raise BusyFolderError(f"{folder}: another process is writing there; give another folder") from None
     except OSError:
-        # Some network file systems lock no folders: there, two at the same time are not noticed.
+        # Some network file systems cannot lock folders: there, a second writer is not detected.
         pass
     return descriptor
 
 
 _RESULT_FILES = ("scenario.toml", "study.parquet")
-"""What shows that a folder has a run or a study in it."""
+"""A folder with one of these files contains a run or a study."""
 
 
 def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> Path:
-    """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the present folder.
+    """Create the folder of a new run: ``out``, or ``runs/<name>-<time>`` in the current folder.
 
-    No other process gets it before this one ends.
+    The folder is locked until this process ends.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> 
 
 
 def _first_free(stem: Path) -> Path:
-    """Create the folder, or, where there is one already, that with the first free number."""
+    """Create the folder; if it exists, create one with the first free number."""
     for n in itertools.count(2):
         folder = stem if n == 2 else stem.with_name(f"{stem.name}-{n - 1}")
         with contextlib.suppress(FileExistsError):

@@ -1,4 +1,4 @@
-"""Joins what the processes of a swarm wrote into one table, block by block: a long flight takes no more memory."""
+"""Joins the parts that the processes of a swarm wrote into one table, block by block, in bounded memory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ftcc.link.recording import Column
 __all__ = ["merge_parts", "merge_run", "up_to_date_table"]
 
 _BLOCK = 65536
-"""Rows, of all UAVs together, that are joined at a time."""
+"""Rows of all UAVs that are joined at a time."""
 
 
 def up_to_date_table(run: Path) -> Path:
@@ -55,7 +55,7 @@ def _last_write(run: Path) -> int:
 
 
 class _Part:
-    """A part of the recording, read batch by batch, to its last one that is whole; not open in between."""
+    """A part of the recording, read batch by batch up to the last complete batch; closed between reads."""
 
     def __init__(self, path: Path) -> None:
         import pyarrow as pa
@@ -71,7 +71,7 @@ class _Part:
             self._at = file.tell()
 
     def fill(self, rows: int) -> None:
-        """Have so many rows at hand, or all that are left."""
+        """Read until ``rows`` rows are in memory, or the part ends."""
         import pyarrow as pa
 
         if self._rows >= rows or self.ended:
@@ -83,7 +83,7 @@ class _Part:
                 try:
                     batch = pa.ipc.read_record_batch(messages.read_next_message(), self.schema)
                 except (StopIteration, pa.ArrowInvalid, OSError, EOFError):
-                    # The end, or the batch in whose middle the writer was killed.
+                    # The end, or an incomplete batch: its writer was killed.
                     self.ended = True
                 else:
                     self._at = file.tell()
@@ -92,11 +92,11 @@ class _Part:
 
     @property
     def until(self) -> float:
-        """Time up to which its rows are at hand, s."""
+        """Time up to which rows are in memory, s."""
         return math.inf if self.ended else float(self._batches[-1].column("t")[-1].as_py())
 
     def take(self, until: float) -> Any:
-        """The rows at hand up to a time, as a ``pyarrow.Table``."""
+        """Remove the rows up to ``until`` (s) from memory and return them, as a ``pyarrow.Table``."""
         import pyarrow as pa
 
         table = pa.Table.from_batches(self._batches, schema=self.schema)
@@ -107,16 +107,16 @@ class _Part:
 
 
 def merge_parts(folder: Path, target: Path, as_of: int) -> bool:
-    """Join the parts in ``folder`` on time and UAV, and write them into ``target``; False if there is not one row.
+    """Join the parts in ``folder`` on time and UAV, and write them into ``target``; return False if there is no row.
 
-    Where one of a UAV's two processes wrote nothing, the value is nan.
+    A value that a UAV's process did not write is nan.
 
     Parameters
     ----------
     folder : Path
     target : Path
     as_of : int
-        Time of change that the file is given, ns.
+        Modification time of the file, ns.
     """
     import pyarrow as pa
 
@@ -126,8 +126,8 @@ def merge_parts(folder: Path, target: Path, as_of: int) -> bool:
             try:
                 parts.append(_Part(path))
             except (pa.ArrowInvalid, OSError, EOFError):
-                continue  # not even a schema: killed as it began
-    # The vehicle's part first: its columns lead.
+                continue  # no schema: the process was killed at its start
+    # Each vehicle's part first: its columns come first.
     parts.sort(key=lambda part: (part.uav, part.is_autopilot))
     columns = [
         Column(f.name, f.metadata[b"unit"].decode(), f.metadata[b"meaning"].decode())
@@ -146,7 +146,7 @@ def merge_parts(folder: Path, target: Path, as_of: int) -> bool:
 
 
 def _blocks(parts: Sequence[_Part], names: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
-    """All rows by time, then UAV."""
+    """Yield all rows in order of time, then UAV, block by block."""
     uavs = sorted({part.uav for part in parts})
     while parts and not all(part.ended for part in parts):
         for part in parts:
@@ -161,7 +161,7 @@ def _blocks(parts: Sequence[_Part], names: Sequence[str]) -> Iterator[dict[str, 
 
 
 def _join(uav: int, tables: Sequence[Any], names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """The parts of one UAV side by side, a row for every time that occurs."""
+    """Join the parts of one UAV: a row for every time in any part."""
     times = [table.column("t").to_numpy() for table in tables]
     t = np.unique(np.concatenate(times))
     joined: dict[str, NDArray[Any]] = {name: np.full(len(t), np.nan) for name in names}

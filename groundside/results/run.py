@@ -1,6 +1,6 @@
-"""A run's folder: what was flown, what happened, and the recording.
+"""A run's folder: the scenario, the events and the recording.
 
-``scenario.toml`` (as flown), ``parts/`` (what each process wrote), ``events.jsonl``, ``signals.parquet``, ``report/``.
+``scenario.toml`` (as flown), ``parts/`` (one file per process), ``events.jsonl``, ``signals.parquet``, ``report/``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["Run"]
 
 
 class Run:
-    """A recorded flight; of one that goes on, what there was when it was first looked at.
+    """A recorded flight; for a flight in progress, its state at the first access.
 
     Parameters
     ----------
@@ -59,8 +59,10 @@ class Run:
 
     @property
     def started(self) -> float:
-        """Unix time (s) of simulated time 0 in exported tracks: when the run started, or a simulation was recorded; of
-        a run of an earlier version, when its folder was begun.
+        """Unix time (s) of simulated time 0 in exported tracks.
+
+        It is the start of the run or the time at which a simulation was recorded; for a run of an earlier version, the
+        time of its scenario file.
         """
         flown = self.scenario.plan.flown
         if flown is not None and flown.run is not None:
@@ -69,12 +71,12 @@ class Run:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What happened, in order of simulated time: t, uav, severity, text."""
+        """The events in order of simulated time: t (s), uav, severity, text."""
         return read_events(self.path / "events.jsonl")
 
     @property
     def lost(self) -> dict[int, tuple[float, str]]:
-        """UAVs that did not end the flight: when (s), and what the log says of them."""
+        """UAVs that were lost, by id: time (s), and cause from the event log."""
         found: dict[int, tuple[float, str]] = {}
         for event in self.events:
             if event["severity"] == "error" and event["uav"] is not None:
@@ -103,7 +105,7 @@ class Run:
     def signals(self) -> Any:
         """The recording as a ``pyarrow.Table``: a row per recorded tick and UAV; units in the columns' metadata.
 
-        All of it, in memory: of a long flight, ask for one `column` after the other.
+        The whole table is in memory; for a long flight, read one `column` after the other.
         """
         return self._columns.read_all()
 
@@ -135,9 +137,9 @@ class Run:
         return self._columns.column(name, uav)
 
     def merge(self) -> Path:
-        """Join what the processes wrote into ``signals.parquet``; what a killed one wrote counts to its last batch.
+        """Merge the processes' parts into ``signals.parquet``; a killed process counts up to its last complete batch.
 
-        Rows are joined on time and UAV; where one of a UAV's two processes wrote nothing, the value is nan.
+        Rows are joined on time and UAV. A value that a UAV's process did not write is nan.
 
         Raises
         ------
@@ -148,7 +150,7 @@ class Run:
 
     @functools.cached_property
     def links(self) -> dict[str, NDArray[Any]]:
-        """What the UAVs told of their in-edges, a row per edge and second: the columns of ``LINK_COLUMNS``."""
+        """The UAVs' reports on their in-edges, a row per edge and second: the columns of ``LINK_COLUMNS``."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 

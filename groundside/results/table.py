@@ -1,4 +1,4 @@
-"""``signals.parquet``: how it is written."""
+"""Writes ``signals.parquet``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["TableWriter"]
 
 
 def _ordered(columns: Sequence[Column]) -> list[Column]:
-    """Columns without repetition, the leading ones first."""
+    """Return the columns without repetition, the leading ones first."""
     unique = {column.name: column for column in reversed(columns)}
     first = [unique[name] for name in LEADING if name in unique]
     rest = [column for column in dict.fromkeys(unique[c.name] for c in columns) if column.name not in LEADING]
@@ -24,15 +24,15 @@ def _ordered(columns: Sequence[Column]) -> list[Column]:
 
 
 class TableWriter:
-    """Writes a table block by block: a Parquet file that appears when it is complete, and not where that fails.
+    """Writes a table block by block, as a Parquet file that appears only when it is complete.
 
     Parameters
     ----------
     path : Path
     columns : sequence of Column
-        Of all parts, repetitions allowed.
+        The columns of all parts; repetitions are allowed.
     as_of : int, optional
-        The file's time of change, ns; default: now.
+        The file's modification time, ns; default: now.
     """
 
     def __init__(self, path: Path, columns: Sequence[Column], as_of: int | None = None) -> None:

@@ -1,4 +1,4 @@
-"""The tracks of a run for maps: KML (Google Earth) and GPX, a track per UAV, from the recording."""
+"""Exports for maps: KML (Google Earth) and GPX, with a track per UAV."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ftcc.link.home import Home
 __all__ = ["Point", "track", "write_gpx", "write_kml"]
 
 _RATE = 10.0
-"""Points a simulated second, at most."""
+"""Most points in a simulated second, Hz."""
 _KML = "http://www.opengis.net/kml/2.2"
 _GOOGLE = "http://www.google.com/kml/ext/2.2"
 _GPX = "http://www.topografix.com/GPX/1/1"
 
 
 class Point(NamedTuple):
-    """Where a UAV is when."""
+    """A position at a time."""
 
     time: str
-    """UTC, as XML has it: the run's start and the simulated time."""
+    """UTC in the format of XML: the run's start plus the simulated time."""
     latitude: float
     longitude: float
     """deg."""
@@ -38,7 +38,7 @@ class Point(NamedTuple):
 
 
 def track(run: Run, uav: int) -> list[Point]:
-    """True positions of a UAV at up to 10 Hz, its first and its last among them; empty where none was recorded."""
+    """Return a UAV's true positions at up to 10 Hz, with the first and the last; empty if none was recorded."""
     home = Home(*run.mission.home)
     columns = [run.column(name, uav) for name in ("t", "x", "y", "z")]
     t, x, y, z = (column[np.isfinite(np.sum(columns, axis=0))] for column in columns)
@@ -111,7 +111,7 @@ def write_gpx(run: Run, file: Path) -> None:
 
 
 def _tracks(run: Run) -> Iterator[tuple[int, list[Point]]]:
-    """The UAVs that have a track, with it."""
+    """Yield each UAV that has a track, with its points."""
     found = [(uav, points) for uav in run.uavs if (points := track(run, uav))]
     if not found:
         raise RunError(f"{run.path}: no positions were recorded")

@@ -1,6 +1,6 @@
-"""A run as ULog files, the logs of PX4: one per UAV, for PlotJuggler, pyulog's tools and others.
+"""Exports ULog files, the logs of PX4: one per UAV, for PlotJuggler, pyulog's tools and others.
 
-pyulog writes what it has read; here it is given what a file would have held instead.
+pyulog can only write a log that it has read; here its log object is filled directly.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from ftcc.sim.plant import TRUTH
 __all__ = ["write_ulogs"]
 
 _RATE = 10.0
-"""Of what is told in PX4's topics, Hz at most; the recording itself is told at its own rate."""
+"""Highest rate of PX4's topics, Hz; the recording itself keeps its rate."""
 _TYPES = {"uint64_t": "<u8", "int32_t": "<i4", "uint8_t": "u1", "float": "<f4", "double": "<f8"}
 _LEVELS = {"error": ord("3"), "warning": ord("4"), "info": ord("6")}
-"""Severities of events as those of ULog's messages."""
+"""ULog's log level for each severity of an event."""
 _FIX_3D = 3
 
 _Columns = Sequence[tuple[str, str, NDArray[Any]]]
-"""Name, ULog type and values of each field but the time."""
+"""Name, ULog type and values of each field except the time."""
 
 
 def write_ulogs(run: Run, folder: Path) -> list[Path]:
@@ -81,7 +81,7 @@ def _log_of(run: Run, uav: int) -> Any:
 
 
 def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mapping[str, NDArray[Any]]) -> None:
-    """The topics that PX4 has of attitude and position, from those true states that there are."""
+    """Add PX4's topics of attitude and position, from the recorded true states."""
     from ftcc.sim.sensors import encode_state
 
     if any(name not in recorded for name in TRUTH):
@@ -91,7 +91,7 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
     if not len(chosen):
         return
     t = stamps[chosen]
-    # A point mass has no attitude of its own: it is shown along its path.
+    # A point mass has no attitude: it is shown along its path.
     rows = np.nan_to_num(truth[chosen], nan=0.0)
     messages = np.empty((len(rows), 13))
     for row, message in zip(rows, messages, strict=True):
@@ -134,14 +134,14 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
 
 
 def _thin(stamps: NDArray[np.uint64], wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Rows that are ``wanted``, at most `_RATE` a second."""
+    """Return the ``wanted`` rows, at most `_RATE` a second."""
     rows = np.flatnonzero(wanted)
     bins = (stamps[rows].astype(np.int64) * int(_RATE)) // 1_000_000
     return rows[np.unique(bins, return_index=True)[1]]
 
 
 def _add(log: Any, topic: str, stamps: NDArray[np.uint64], columns: _Columns) -> None:
-    """A topic with its data; ``q[0]`` to ``q[3]`` are one field, ``q``."""
+    """Add a topic with its data; ``q[0]`` to ``q[3]`` are one field, ``q``."""
     from pyulog import ULog
 
     fields = [("timestamp", "uint64_t", stamps), *columns]
