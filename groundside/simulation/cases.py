@@ -1,4 +1,4 @@
-"""Every case of a scenario flown in memory, and its claims held against the flight."""
+"""Flies the cases of a scenario in memory and evaluates their claims."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ __all__ = ["cases_of", "claims_in_flight", "load_case"]
 
 
 def cases_of(scenario: Scenario) -> list[str]:
-    """The cases of a scenario's file: each form, and every other case that a claim names."""
+    """Return the cases of a scenario: each form, and every other case that a claim names."""
     forms, _ = forms_and_variants(scenario.source)
     return list(dict.fromkeys([*forms, *(case for claim in scenario.plan.claims for case in claim.expected)]))
 
 
 def load_case(name: str, case: str, settings: Sequence[str] = (), **options: float | None) -> Scenario:
-    """A scenario in a case such as ``flight+P+off``; ``options`` are seed and duration, see `scenario.load`."""
+    """Load a scenario in a case such as ``flight+P+off``; ``options`` are seed and duration, see `scenario.load`."""
     form, *variants = case.split("+")
     return load(name, form=form, variants=variants, settings=settings, **options)  # type: ignore[arg-type]
 
 
 def claims_in_flight(scenario: Scenario) -> tuple[Flight, list[Result]]:
-    """Fly a scenario in memory and hold the claims of its case against the flight."""
+    """Fly a scenario in memory; return the flight and the results of its case's claims."""
     mission = resolve(scenario)
     flight = fly_in_memory(mission)
     return flight, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration)

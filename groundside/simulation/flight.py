@@ -22,15 +22,15 @@ __all__ = ["Flight"]
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight, or a part of one, in memory; offers its columns as a `Run` does."""
+    """A flight, or a part of one, in memory, with the same columns as a `Run`."""
 
     mission: Mission
     truth: NDArray[np.float64]
-    """(n, k, 13): recorded tick, UAV in the order of the mission, in the order of ``TRUTH``; nan once a UAV is lost."""
+    """(n, k, 13): by recorded tick, UAV in the mission's order, and ``TRUTH``; nan after a UAV was lost."""
     command: NDArray[np.float64]
-    """(n, k, 4): in force, by the actuators' slots."""
+    """(n, k, 4): commands in force, by the actuators' slots."""
     acting: NDArray[np.float64]
-    """(n, k, 4): what acts on the airframe."""
+    """(n, k, 4): actuator positions that act on the airframe, by slot."""
     conditions: NDArray[np.float64]
     """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
     signals: NDArray[np.float64]
@@ -40,11 +40,11 @@ class Flight:
     t: NDArray[np.float64]
     """(n,): s."""
     lost: dict[int, tuple[float, str]]
-    """When (s) and why a UAV was lost."""
+    """Time (s) and cause of each loss, by UAV."""
     events: tuple[tuple[float, int, str, str], ...] = ()
-    """What happened otherwise: time s, UAV, severity, text."""
+    """All other events: time s, UAV, severity, text."""
     first_report: int = 0
-    """Number of the first one in ``links``."""
+    """Number of the first report in ``links``."""
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -77,16 +77,16 @@ class Flight:
 
     @functools.cached_property
     def verdict(self) -> Verdict:
-        """How it went."""
+        """How the flight went."""
         return judge(self, self.mission, self.lost)
 
     @functools.cached_property
     def _flown(self) -> list[int]:
-        """Rows of each UAV, in the order of the mission."""
+        """Number of rows of each UAV, in the mission's order."""
         return [int(rows) for rows in np.isfinite(self.truth[:, :, 0]).sum(axis=0)]
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
-        """A column of one UAV in order of time, as far as it flew."""
+        """Return a column of one UAV in order of time, up to its loss."""
         i = self.mission.uavs.index(uav)
         rows = self._flown[i]
         if name == "t":
@@ -95,7 +95,7 @@ class Flight:
         return values[:rows, i, n]
 
     def link_table(self) -> dict[str, NDArray[Any]]:
-        """A row per report and in-edge, by time, then receiver; the columns of ``link.recording.LINK_COLUMNS``."""
+        """Return the columns ``link.recording.LINK_COLUMNS``: a row per report and in-edge, by time, then receiver."""
         timing = self.mission.timing
         numbers = np.arange(self.first_report, self.first_report + len(self.links))
         times = numbers * (timing.report_every * timing.period_us / 1e6)
@@ -117,7 +117,7 @@ class Flight:
         return {name: column[reported] for name, column in table.items()}
 
     def table(self) -> dict[str, NDArray[Any]]:
-        """All columns, a row per recorded tick and UAV, by time, then UAV."""
+        """Return all columns: a row per recorded tick and UAV, by time, then UAV."""
         order = np.argsort(self.mission.uavs)
         flown = np.isfinite(self.truth[:, order, 0]).ravel()
         table: dict[str, NDArray[Any]] = {

@@ -57,47 +57,47 @@ _advance = cycle.advance
 _conditions = cycle.conditions
 
 _OWN_COMMAND = Own._fields.index("aileron")
-"""Where the command in force begins in `Own`."""
+"""Index of the first actuator command in `Own`."""
 _V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
 
 _SETTLED = 1e-6
-"""Exchanges of one instant end when no shared value moves by more, in its unit."""
+"""The exchange at one time is repeated until no shared value changes by more than this, in its unit."""
 
 
 class Recording(NamedTuple):
-    """Rows of the recording, time first, then UAV; nan after a UAV was lost."""
+    """Rows of the recording, by time, then UAV; nan after a UAV was lost."""
 
     truth: NDArray[np.float64]
     """(n, k, 13)."""
     command: NDArray[np.float64]
-    """(n, k, 4): in force."""
+    """(n, k, 4): commands in force."""
     acting: NDArray[np.float64]
-    """(n, k, 4)."""
+    """(n, k, 4): actuator positions that act on the airframe."""
     conditions: NDArray[np.float64]
     """(n, k, c): what only the simulator knows, see ``sim.plants.conditions_of``."""
     signals: NDArray[np.float64]
     """(n, k, s)."""
     links: NDArray[np.float64]
-    """(m, k, e, 5): of each in-edge, see ``link.channel.LINK_REPORT``; nan where there is none."""
+    """(m, k, e, 5): by in-edge, see ``link.channel.LINK_REPORT``; nan where there is none."""
     lost: NDArray[np.int64]
-    """(k,): why a UAV was lost, 0 = it was not."""
+    """(k,): cause of a loss, see ``sim.plant.LOST``; 0 = not lost."""
     lost_us: NDArray[np.int64]
-    """(k,): when."""
+    """(k,): time of a loss, us."""
     first: NDArray[np.int64]
-    """(2,): which row, and which report, of the flight the first of each here is."""
+    """(2,): numbers, within the flight, of the first row and the first report in this recording."""
 
     def begin(self, row: int, report: int) -> None:
-        """Empty it for the rows from ``row`` and the reports from ``report`` on."""
+        """Clear the recording; it then begins with row ``row`` and report ``report`` of the flight."""
         for part in (self.truth, self.command, self.acting, self.conditions, self.signals, self.links):
             part.fill(np.nan)
         self.first[:] = row, report
 
 
 def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple[int, int]) -> Recording:
-    """An empty recording of ``rows`` ticks and ``reports`` on the links.
+    """Return an empty recording of ``rows`` ticks and ``reports`` reports on links.
 
-    ``widths`` are the numbers of columns of truth, commands, what acts, conditions and signals, ``edges`` the numbers
-    of UAVs and of the in-edges that each has at most.
+    ``widths`` are the numbers of columns of truth, commands, acting positions, conditions and signals. ``edges`` holds
+    the number of UAVs and the largest number of in-edges.
     """
     k = edges[0]
     truth, command, acting, conditions, signals = (np.full((rows, k, width), np.nan) for width in widths)
@@ -115,7 +115,7 @@ def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple
 
 
 class World(NamedTuple):
-    """A whole swarm in one process: all that a flight works on."""
+    """A whole swarm in one process: all arrays of a flight."""
 
     fleet: Fleet
     autopilots: Autopilots
@@ -126,13 +126,13 @@ class World(NamedTuple):
     true: NDArray[np.float64]
     """(k, 13): the states of this tick."""
     measured: NDArray[np.float64]
-    """(13,): room for one as measured."""
+    """(13,): scratch for a measured state."""
     state: NDArray[np.float64]
-    """(13,): room for one as a message carries it."""
+    """(13,): scratch for a state as a message carries it."""
     controls: NDArray[np.float64]
-    """(4,): room for a command as a message carries it."""
+    """(4,): scratch for a command as a message carries it."""
     target: NDArray[np.float64]
-    """(5,): room for an attitude target."""
+    """(5,): scratch for an attitude target."""
 
 
 def new_world(
@@ -142,9 +142,9 @@ def new_world(
     conditions: int,
     room: int | None = None,
 ) -> World:
-    """The swarm before the first tick; only the simulator knows ``conditions`` numbers of each vehicle.
+    """Return the swarm before the first tick; ``conditions`` is the number of columns that only the simulator has.
 
-    Its recording has room for the rows of so many ticks, by default of all.
+    The recording has space for ``room`` ticks, by default for all.
     """
     autopilots, inbox = build_autopilots(specs, timing)
     uavs = [spec.uav for spec in specs]
@@ -172,8 +172,8 @@ def new_world(
 def fly_ticks(world, timing, wire, first, last):
     """Fly the ticks first..last-1.
 
-    With ``wire``, states and commands pass through the messages' float32, records through the mesh's latency, and a
-    command acts one sample after its measurement, as between processes; without, the exchange is ideal.
+    With ``wire``, as between processes: messages carry states and commands as float32, records have the mesh's latency,
+    and a command acts one sample after its measurement. Without ``wire`` the exchange is ideal.
     """
     for n in range(first, last):
         set_links(world.events, world.inbox, n * timing.period_us)
@@ -187,7 +187,7 @@ def fly_ticks(world, timing, wire, first, last):
 
 @compiled
 def _tick_by_wire(world, timing, n):
-    """A tick as between processes."""
+    """Fly one tick as between processes."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
     for i in range(lost.shape[0]):
         if lost[i] == 0:
@@ -208,7 +208,7 @@ def _tick_by_wire(world, timing, n):
 
 @compiled
 def _ideal_tick(world, timing, n):
-    """A tick with an ideal exchange: all sense, then all share, then all step; a command acts at once."""
+    """Fly one tick with ideal exchange: all sense, then all share, then all step; a command acts at once."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
     for i in range(lost.shape[0]):
         if lost[i] > 0:
@@ -222,7 +222,7 @@ def _ideal_tick(world, timing, n):
         copy(world.measured, own[1:])
         copy(fleet.command[i], own[_OWN_COMMAND:])
         if autopilots.leader[i] == 1:
-            # Leaders hear each other's records up to the tick before; all share a tick's state only after this.
+            # Leaders use each other's records of the previous tick; records of this tick are published later.
             _hear(world.exchange, inbox, world.events, timing, i, now)
         _refer(autopilots, inbox, i, now, timing.period_us)
     for i in range(lost.shape[0]):
@@ -250,13 +250,13 @@ def _ideal_tick(world, timing, n):
 
 @compiled
 def _flies(recording, i, now):
-    """Whether the vehicle of UAV ``i`` flies on from ``now``: it does so, too, where only its law has failed now."""
+    """Return whether UAV ``i`` still flies at ``now`` (us); it does if its law diverged only at this tick."""
     return recording.lost[i] == 0 or (recording.lost[i] == DIVERGED and recording.lost_us[i] == now)
 
 
 @compiled
 def _apply_last_command(world, i):
-    """The last command, as a message carries it."""
+    """Put the last command of UAV ``i`` into force, as a message carries it."""
     fleet, autopilots = world.fleet, world.autopilots
     if autopilots.leader[i] == 1:
         copy(autopilots.target[i], fleet.target[i])
@@ -275,7 +275,7 @@ def _apply_last_command(world, i):
 
 @compiled
 def _control_follower(world, timing, i, now):
-    """The law of a follower; where its command is not finite the UAV is lost."""
+    """Step the law of a follower; the UAV is lost if its command is not finite."""
     if world.autopilots.leader[i] == 1:
         return
     if not _control(world.autopilots, world.inbox, i, timing.period_us / 1e6):
@@ -286,9 +286,9 @@ def _control_follower(world, timing, i, now):
 
 @compiled
 def _settle_exchange(world, now, dt):
-    """Repeat the ideal exchange of this instant until the shared values have settled, all at once each time.
+    """Repeat the ideal exchange at this time until the shared values converge; all UAVs exchange at once.
 
-    For a law whose shared values depend on what it hears of the same instant: an algebraic loop around the graph.
+    For a law whose shared values depend on its neighbours' values of the same time: an algebraic loop around the graph.
     """
     exchange, autopilots, inbox, lost = world.exchange, world.autopilots, world.inbox, world.recording.lost
     for _ in range(_SWEEPS - 1):
@@ -311,7 +311,7 @@ def _settle_exchange(world, now, dt):
 
 @compiled
 def _record(world, timing, n):
-    """A row of each UAV that flies, and one on each of its in-edges, where they are due."""
+    """Record a row of each flying UAV, and a report on each of its in-edges, if they are due."""
     recording, fleet, now = world.recording, world.fleet, n * timing.period_us
     every, report_every = timing.record_every, ticks_a_second(timing.period_us)
     for i in range(recording.lost.shape[0]):
@@ -330,7 +330,7 @@ def _record(world, timing, n):
 
 @compiled
 def _advance_vehicles(world, timing, n):
-    """Fly the vehicles for one period; one that leaves its model is lost."""
+    """Advance the vehicles by one period; a vehicle that leaves its model's valid range is lost."""
     now, recording = n * timing.period_us, world.recording
     for i in range(recording.lost.shape[0]):
         if _flies(recording, i, now):

@@ -30,17 +30,17 @@ from ftcc.sim.plants import conditions_of, cycle_of
 __all__ = ["PlainPython", "Progress", "defer_interrupt", "fly_in_memory", "fly_in_parts", "loop_of"]
 
 _CHUNKS = 100
-"""A flight is flown in so many pieces, between which progress is shown and Ctrl-C is heard."""
+"""Number of pieces of a flight; progress is reported and Ctrl-C takes effect between them."""
 
 Progress = Callable[[float], None]
 
 
 class PlainPython(UserWarning):
-    """A scheme flies as plain Python, because numba cannot compile it."""
+    """A scheme flies as plain Python because numba cannot compile it."""
 
 
 def loop_of(scheme: str, plant: str) -> ModuleType:
-    """The flight of a scheme on a plant, see `flight_loop`: compiled, or plain Python if numba refuses the scheme."""
+    """Return `flight_loop` for a scheme and a plant: compiled, or plain Python if numba cannot compile the scheme."""
     stages = stages_of(scheme)
     loop = instantiate(
         "ftcc.groundside.simulation.flight_loop", f"{scheme},{plant}", stages=stages, cycle=cycle_of(plant)
@@ -68,7 +68,7 @@ def fly_in_memory(
     TooLargeError
         If the recording does not fit into memory.
     """
-    # What is made of it takes as much again.
+    # Results that are computed from it need the same space again.
     require_space(mission, 2 * recording_size(mission)[1], psutil.virtual_memory().available / 1e9, "memory")
     return fly_in_parts(mission, mission.timing.ticks + 1, lambda _: None, progress, ready)
 
@@ -80,7 +80,7 @@ def fly_in_parts(
     progress: Progress | None,
     ready: Callable[[], None] | None,
 ) -> Flight:
-    """Fly a mission; ``take`` is given what was recorded after every ``room`` ticks, and the last part comes back."""
+    """Fly a mission; pass the recording of every ``room`` ticks to ``take``, and return the last part."""
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
     if loop.stages.REFUSAL:
@@ -108,14 +108,17 @@ def fly_in_parts(
             if progress is not None:
                 progress((flown - 1) * timing.period)
         except KeyboardInterrupt:
-            # What has been flown is recorded; a shorter flight than was asked for is not hidden.
+            # The flight so far is recorded, and its verdict says that it ended early.
             interrupted = True
     return _flight_so_far(mission, world.recording, taken, flown, events)
 
 
 @contextlib.contextmanager
 def defer_interrupt() -> Iterator[None]:
-    """Ctrl-C that comes meanwhile is heard afterwards: no block is written by half. It only reaches the main thread."""
+    """Delay Ctrl-C to the end of the ``with`` block, so that data is written whole.
+
+    Only the main thread receives Ctrl-C; other threads need no delay.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -132,7 +135,7 @@ def defer_interrupt() -> Iterator[None]:
 def _flight_so_far(
     mission: Mission, recording: Any, begin: int, end: int, events: list[tuple[float, int, str, str]]
 ) -> Flight:
-    """What ticks ``begin`` .. ``end`` - 1 have recorded, and what has happened up to then."""
+    """Return the recording of ticks ``begin`` .. ``end`` - 1, with all events so far."""
     timing = mission.timing
     row, report = (int(first) for first in recording.first)
     rows = ((end - 1) // timing.record_every + 1 if end > begin else row) - row
@@ -157,7 +160,7 @@ def _flight_so_far(
 
 
 def _drain_all_events(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:
-    """What vehicles and autopilots have noted: time s, UAV, severity, text."""
+    """Remove and return the events of vehicles and autopilots: time s, UAV, severity, text."""
     entries = [(at, mission.uavs[i], number) for at, i, _, number in drain_events(fleet.events)]
     events = [(at, uav, "warning", entered_text(uav, number)) for at, uav, number in entries]
     events += drain_leader_events(autopilots, mission.autopilots)

@@ -11,11 +11,11 @@ __all__ = ["TooLargeError", "recording_size", "require_space"]
 
 
 class TooLargeError(UserError):
-    """A flight whose recording does not fit into memory, or not on the disk."""
+    """The recording of a flight does not fit into memory or on the disk."""
 
 
 def recording_size(mission: Mission) -> tuple[int, float]:
-    """Rows of each UAV, and the GB that all of them take."""
+    """Return the rows of each UAV, and the size of the whole recording in memory, GB."""
     timing, uavs = mission.timing, len(mission.uavs)
     rows = timing.ticks // timing.record_every + 1
     columns = 2 + len(TRUTH) + 2 * 4 + len(conditions_of(mission.plant)) + len(mission.scheme.signals)
@@ -23,7 +23,12 @@ def recording_size(mission: Mission) -> tuple[int, float]:
 
 
 def require_space(mission: Mission, needed: float, free: float, of: str) -> None:
-    """Refuse a flight whose recording takes more GB than are free."""
+    """Refuse a flight whose recording needs more GB than are free.
+
+    Raises
+    ------
+    TooLargeError
+    """
     if needed > free:
         what = f"{recording_size(mission)[0]} rows of {len(mission.uavs)} UAVs"
         raise TooLargeError(

@@ -21,9 +21,9 @@ from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
 __all__ = ["simulate"]
 
 _BLOCK = 65536
-"""Rows, of all UAVs together, that `simulate` has in memory and then writes."""
+"""Rows of all UAVs that `simulate` keeps in memory before it writes them."""
 _LEAST_SHARE = 0.1
-"""Of what rows take in memory, what they take on disk at the very least: only what never changes takes less."""
+"""Least size on disk, as a share of the size in memory; only constant columns take less."""
 
 
 def simulate(
@@ -34,11 +34,11 @@ def simulate(
     Raises
     ------
     TooLargeError
-        If the recording surely does not fit on the disk.
+        If the recording certainly does not fit on the disk.
     OSError
-        If it cannot be written, as on a disk that is full.
+        If it cannot be written, for example on a full disk.
     """
-    # What the columns' descriptions pull in is not needed where nothing is recorded.
+    # These imports are slow, and only a recording needs them.
     from ftcc.airside.process import columns as autopilot_columns
     from ftcc.sim.process import columns as vehicle_columns
 
@@ -69,7 +69,7 @@ def simulate(
 
 
 def _conclude(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:
-    """The run of a flight whose signals up to ``last`` (s) are in ``folder``: with scenario, events and verdict."""
+    """Write scenario, events and verdict of a flight into ``folder``, which has its signals up to ``last`` (s)."""
     (folder / "scenario.toml").write_text(mission.toml_of_run(time.time()), encoding="utf-8")
     events = EventLog(folder / "events.jsonl")
     for t, uav, severity, text in mission.events:

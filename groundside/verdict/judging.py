@@ -1,4 +1,4 @@
-"""What a recording shows of how the flight went: tracking errors, bounds, saturation, limit cycles, losses."""
+"""Judges a flight from its recording: tracking errors, bounds, saturation, limit cycles, losses."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ __all__ = ["judge"]
 
 Array = NDArray[np.float64]
 _MEMORY = 32 << 20
-"""Bytes of values that are kept for when they are asked for again."""
+"""Bytes of computed values that are kept for reuse."""
 
 END, LEAST_END = 0.05, 2.0
-"""What counts as the end of a flight, for errors and bounds: this share of it, so many seconds at least."""
+"""The end of a flight, for errors and bounds: share of its duration, and least duration, s."""
 HULL = 1.0
-"""How far outside the leaders' hull a UAV may be, m; counted from when it first was inside."""
+"""Allowed distance outside the leaders' hull, m; counts after a UAV was inside for the first time."""
 LONG = 0.2
-"""Share of its flight that an actuator may be at its limits without a remark."""
+"""Share of a flight for which an actuator may be at its limits without a remark."""
 RIPPLE = 0.02
-"""Share of an actuator's travel up to which it may oscillate."""
+"""Largest allowed amplitude of an actuator's oscillation, as a share of its travel."""
 ALLOWED = {"m": 5.0, "m/s": 1.0, "rad": 0.1}
-"""Tracking errors at the end, where the scheme does not say what is small; by unit, others are told and not judged."""
+"""Allowed tracking error at the end if the scheme gives none, by unit; other units are reported, not judged."""
 
 _AT_LIMIT = 1e-6
-"""Of the travel: commands are float32."""
+"""Tolerance at a limit, as a share of the travel: commands are float32."""
 _NO_LIMIT = 1e6
-"""A travel beyond this is none."""
+"""A travel above this counts as unlimited."""
 _TOGETHER = 2.0
-"""UAVs whose recordings end within so many seconds flew to the end: processes that are stopped stop one by one."""
+"""UAVs whose recordings end within this time flew to the end, s: processes stop one after the other."""
 _CLOSE = 1e-6
-"""Rounding of times, s."""
+"""Tolerance for equal times, s."""
 
 _HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
           "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
-"""Where leaders are several, all shall be between their altitudes, and who tracks ``x_d`` between their positions."""
+"""With several leaders, followers must be between their altitudes; if they track ``x_d``, also between their positions."""
 
 
 def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
-    """How a flight went.
+    """Judge how a flight went.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, st
         The recording.
     mission : Mission
     lost : mapping
-        When (s) and why a UAV was lost, by id.
+        Time (s) and cause of each loss, by UAV.
     """
     flight = _Flight(signals, mission, lost)
     saturation = sorted(_saturation(flight), key=lambda one: -one.share)
@@ -74,7 +74,7 @@ def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, st
 
 
 class _Flight:
-    """A recording with what its mission says of it."""
+    """A recording together with its mission."""
 
     def __init__(self, signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> None:
         self.signals = signals
@@ -93,15 +93,15 @@ class _Flight:
         self.followers = [uav for uav in self.graph.followers if uav in self.until]
 
     def times(self, uav: int) -> Array:
-        """Of a UAV's rows, s."""
+        """Return the times of a UAV's rows (n,), s."""
         return self.signals.column("t", uav)
 
     def lasted(self, uav: int) -> bool:
-        """Whether a UAV flew to the end."""
+        """Return whether a UAV flew to the end."""
         return uav not in self.lost and self.until.get(uav, -1.0) >= self.end - _TOGETHER
 
     def values(self, expression: str, uav: int) -> Array:
-        """An expression at all times of a UAV."""
+        """Return the values (n,) of an expression at all times of a UAV."""
         found = self._values.get((expression, uav))
         if found is None:
             found = evaluate_expression(expression, self.signals, self.graph, uav)
@@ -111,7 +111,7 @@ class _Flight:
         return found
 
     def can_evaluate(self, expression: str) -> bool:
-        """Whether the recording can say it: places between leaders need leaders that reach everybody."""
+        """Return whether the recording has all columns; columns of the hull need leaders that reach all followers."""
         names = names_in(expression)
         places = names & (set(_HULLS) | {name for name, _ in _HULLS.values()})
         led = bool(self.graph.leaders) and set(self.graph.followers) <= self.graph.reached_from(self.graph.leaders)
@@ -127,7 +127,7 @@ def _losses(flight: _Flight) -> Iterator[Loss]:
 
 
 def _tracking(flight: _Flight) -> Iterator[TrackingError]:
-    """Every tracking error that the scheme declares."""
+    """Yield every tracking error that the scheme declares."""
     for error in flight.mission.scheme.tracking:
         if not flight.can_evaluate(error.name):
             continue
@@ -150,7 +150,7 @@ def _tracking(flight: _Flight) -> Iterator[TrackingError]:
             continue
         size, whose = end if end[1] else (None, None)
         small = None if whose is None else _allowed(flight, error.bound, error.unit, whose)
-        # A bound that is a signal counts as it is in the end.
+        # If the bound is a signal, its last value is reported.
         least = None if small is None else float(np.ravel(small)[-1])
         yield TrackingError(error.name, error.unit, error.meaning, *largest, size, whose, least, too_large)
 
@@ -162,7 +162,7 @@ def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) ->
 
 
 def _outside(flight: _Flight) -> Iterator[Outside]:
-    """Bounds of signals, and the leaders' hull, that a UAV left."""
+    """Yield the bounds of signals, and the leaders' hull, that a UAV left."""
     for signal in flight.mission.scheme.signals:
         for uav in flight.followers if signal.bound is not None else ():
             bound = np.abs(flight.values(str(signal.bound), uav))
@@ -201,7 +201,7 @@ class _Actuator(NamedTuple):
 
 
 def _actuators(flight: _Flight, uav: int) -> list[_Actuator]:
-    """The actuators of a UAV that can move."""
+    """Return the actuators of a UAV that have a limited travel."""
     limits = next(vehicle.limits for vehicle in flight.mission.vehicles if vehicle.uav == uav)
     found = [_Actuator(name, *limits[SLOT[name]]) for name in find(flight.mission.plant).ACTUATORS]
     return [one for one in found if 0.0 < one.travel < _NO_LIMIT]
@@ -218,7 +218,7 @@ def _saturation(flight: _Flight) -> Iterator[Saturation]:
 
 
 def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
-    """The worst oscillation of each UAV, in shares of what is allowed."""
+    """Yield the worst oscillation of each UAV, relative to the allowed amplitude."""
     commanded: list[float] | None = None
     worst: dict[int, tuple[float, LimitCycle]] = {}
     for uav, name, unit, signal, floor in _oscillating(flight):
@@ -234,9 +234,9 @@ def _limit_cycles(flight: _Flight) -> Iterator[LimitCycle]:
 
 
 def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
-    """What may oscillate: UAV, name, unit, column or expression, and the amplitude up to which it may.
+    """Yield each signal to check: UAV, name, unit, column or expression, allowed amplitude.
 
-    One signal of all UAVs after the other, as a recording is read.
+    The order is signal by signal, for all UAVs, as a recording is read.
     """
     lasting = [uav for uav in flight.followers if flight.lasted(uav)]
     actuators = {uav: {one.name: one for one in _actuators(flight, uav)} for uav in lasting}
@@ -252,10 +252,10 @@ def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
 
 
 def _commanded_frequencies(flight: _Flight) -> list[float]:
-    """Frequencies that the scenario or the ground commands, rad/s.
+    """Return the frequencies that the scenario or the ground station causes, rad/s.
 
-    Leaders' motion, what UAVs refer to by themselves, and what fails or disturbs in a rhythm, as an intermittent fault
-    does.
+    They come from the leaders' motion, from the UAVs' own references, and from periodic faults and disturbances, such
+    as an intermittent fault.
     """
     signals = flight.signals
     own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]

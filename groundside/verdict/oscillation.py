@@ -1,8 +1,10 @@
-"""Limit cycles: oscillations that go on, told from transients, noise and what somebody commands.
+"""Limit cycles: sustained oscillations, distinguished from transients, noise and commanded oscillations.
 
-In the last third of a signal, one line of the spectrum must hold most of the power of all that is faster than a drift;
-and, period by period, the signal must swing about its mean over a period by more than what matters, in each of the
-last periods, and in the end by no less than half of what it did in the beginning of that third.
+A signal has a limit cycle if, in its last third,
+
+- one line of the spectrum holds most of the power of all lines that are faster than a drift,
+- the amplitude about the mean over one period exceeds a floor in each of the last periods, and
+- the amplitude at the end is at least half of that at the beginning of the third.
 """
 
 from __future__ import annotations
@@ -18,31 +20,31 @@ __all__ = ["LEAST_PERIODS", "Oscillation", "is_forced", "oscillation"]
 Array = NDArray[np.float64]
 
 LEAST_PERIODS = 8
-"""In the last third: what is slower is taken for a drift or a manoeuvre. In all of the last so many it must swing."""
+"""Fewest periods in the last third; anything slower is a drift or a manoeuvre. So many last periods must oscillate."""
 SHARE = 0.5
-"""Of the power of what is not slower that the line and its neighbourhood must hold."""
+"""Share of the power of all faster lines that the line and its neighbourhood must hold."""
 WIDTH = 0.1
-"""Half-width of that neighbourhood, as a share of the frequency; two lines of the spectrum at least."""
+"""Half-width of the neighbourhood, as a share of the frequency; at least two lines of the spectrum."""
 DECAY = 0.5
-"""An amplitude that in the end is less than this share of the one before decays."""
+"""An oscillation decays if its last amplitude is less than this share of its first."""
 STEADY = 0.3
-"""The least of the last periods must be this share of the largest of them: several lines may beat."""
+"""Least amplitude of the last periods, as a share of the largest: several lines may beat."""
 
 _HARMONICS = (1.0, 2.0, 3.0)
-"""What answers a commanded oscillation comes at its frequency or at these multiples of it."""
+"""The response to a commanded oscillation has its frequency, or these multiples of it."""
 
 
 class Oscillation(NamedTuple):
-    """What a signal does in the end, over and over."""
+    """A sustained oscillation at the end of a signal."""
 
     frequency: float
     """rad/s."""
     amplitude: float
-    """Half of what it swings from peak to peak, in the unit of the signal: median of the last periods."""
+    """Half of peak to peak, in the unit of the signal: median of the last periods."""
 
 
 def _spectrum(x: Array) -> Array:
-    """Power of each line of ``x`` without its straight trend, under a Hann window."""
+    """Return the power of each line of ``x`` without its linear trend, with a Hann window."""
     n = len(x)
     s = np.arange(n) - (n - 1) / 2.0
     straight = x - x.mean() - s * ((s * x).sum() / (s * s).sum())
@@ -51,7 +53,7 @@ def _spectrum(x: Array) -> Array:
 
 
 def _swings(x: Array, period: int) -> Array:
-    """Half of peak to peak in each period of so many rows, of ``x`` less its mean over a period around it."""
+    """Return half of peak to peak in each period (in rows), of ``x`` minus its moving mean over one period."""
     total = np.concatenate([[0.0], np.cumsum(x - x[0])])
     mean = (total[period:] - total[:-period]) / period + x[0]
     swinging = x[period // 2 :][: len(mean)] - mean
@@ -61,18 +63,18 @@ def _swings(x: Array, period: int) -> Array:
 
 
 def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
-    """The oscillation in which a signal ends, None if there is none.
+    """Return the oscillation at the end of a signal, None if there is none.
 
     Parameters
     ----------
     t, x : arrays (n,)
-        Times (s), evenly spaced, and values; what is not finite in the end is left out.
+        Times (s), evenly spaced, and values; values at the end that are not finite are left out.
     floor : float
-        Least amplitude that matters.
+        Amplitudes up to this one are ignored, in the unit of ``x``.
     """
     known = np.flatnonzero(np.isfinite(x))
     rows = int(known[-1]) + 1 if len(known) else 0
-    # A length of many factors two, of which a spectrum is quickly made.
+    # A multiple of 64: its spectrum is fast to compute.
     n = rows // 3 - rows // 3 % 64
     x = np.ascontiguousarray(x[rows - n : rows])
     if n < 4 * LEAST_PERIODS or not np.isfinite(x).all() or np.ptp(x[-n // LEAST_PERIODS :]) <= 2.0 * floor:
@@ -81,7 +83,7 @@ def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
     line = LEAST_PERIODS + int(np.argmax(power[LEAST_PERIODS:]))
     half = max(2.0, WIDTH * line)
     neighbourhood = power[max(0, round(line - half)) : round(line + half) + 1]
-    # The flank of something slower is no line.
+    # The flank of a slower line is not a line of its own.
     if power[line] <= power[line - 1] or neighbourhood.sum() < SHARE * power[LEAST_PERIODS:].sum():
         return None
     swings = _swings(x, round(n / line))
@@ -93,5 +95,5 @@ def oscillation(t: Array, x: Array, floor: float = 0.0) -> Oscillation | None:
 
 
 def is_forced(frequency: float, commanded: Iterable[float]) -> bool:
-    """Whether an oscillation answers one of ``commanded`` frequencies (rad/s), or is a multiple of it."""
+    """Return whether a frequency (rad/s) is one of the ``commanded`` frequencies (rad/s) or a multiple of one."""
     return any(abs(frequency - n * one) <= WIDTH * frequency for one in commanded for n in _HARMONICS)

@@ -1,10 +1,10 @@
-"""How a flight went: what was found, and one word for it.
+"""How a flight went: the findings, and a verdict.
 
-- **failed**: an aircraft was lost or its recording ended early; or at the end a tracking error was larger than what its
-  scheme allows, a UAV was outside a bound of its scheme, or an oscillation did not decay.
-- **with remarks**: none of that, but a bound was left for a while, an actuator was at its limits for long, the flight
-  ended before its time, or nothing says what the scheme tracks.
-- **as it should be**: nothing to remark.
+- **failed**: an aircraft was lost or its recording ended early; or, at the end, a tracking error was larger than its
+  scheme allows, a UAV was outside a bound of its scheme, or an oscillation had not decayed.
+- **with remarks**: not failed, but a bound was left for a while, an actuator was at its limits for a long time, the
+  flight ended early, or the scheme declares no tracking errors.
+- **as it should be**: none of these.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ __all__ = [
 ]
 
 SCHEMA_VERSION = 1
-"""Of ``verdict.json``."""
+"""Version of ``verdict.json``."""
 
 AS_IT_SHOULD, REMARKS, FAILED = "as it should be", "with remarks", "failed"
-"""The words."""
+"""The verdicts, in a few words each."""
 
 VERDICT_FILE = "verdict.json"
-"""In a run's folder."""
+"""The verdict's file in a run's folder."""
 
 _SEVERITY = {AS_IT_SHOULD: "info", REMARKS: "warning", FAILED: "error"}
 
@@ -56,14 +56,14 @@ class TrackingError:
     """Absolute value."""
     uav: int
     at: float
-    """Whose it was, and when, s."""
+    """Time of the largest value, s; ``uav`` had it."""
     end: float | None
-    """Largest absolute value in the end, of those UAVs that flew until then; None without any."""
+    """Largest absolute value at the end, over UAVs that flew to the end; None if none did."""
     end_uav: int | None
     allowed: float | None
-    """What it may be in the end; None where nothing says it."""
+    """Largest allowed value at the end; None if the scheme gives none."""
     too_large: bool
-    """In the end."""
+    """Whether it was above the allowed value at the end."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ class Outside:
     uav: int
     seconds: float
     until: float
-    """When it was outside last, s."""
+    """Last time outside, s."""
     at_end: bool
-    """Outside in the end of the flight."""
+    """Whether it was outside at the end of the flight."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Saturation:
     actuator: str
     uav: int
     share: float
-    """Of the time that the UAV flew."""
+    """Share of the time that the UAV flew, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -100,12 +100,12 @@ class LimitCycle:
     frequency: float
     """rad/s."""
     amplitude: float
-    """In the end."""
+    """At the end, in ``unit``."""
 
 
 @dataclass(frozen=True)
 class Loss:
-    """A UAV that did not end the flight."""
+    """A UAV that was lost before the end of the flight."""
 
     uav: int
     at: float
@@ -118,23 +118,23 @@ class Verdict:
     """How a flight went."""
 
     flown: float
-    """s."""
+    """Duration of the recording, s."""
     planned: float
-    """s."""
+    """Duration of the mission, s."""
     tracking: tuple[TrackingError, ...]
-    """In the order in which the scheme declares them; empty where it declares none."""
+    """In the order in which the scheme declares them; empty if it declares none."""
     outside: tuple[Outside, ...]
     saturation: tuple[Saturation, ...]
-    """All that ever was, the longest first."""
+    """Every actuator that was ever at a limit, the longest time first."""
     saturated: tuple[Saturation, ...]
-    """Those that were for long."""
+    """Those that were at a limit for a long time."""
     limit_cycles: tuple[LimitCycle, ...]
-    """The largest of each UAV."""
+    """The largest one of each UAV."""
     lost: tuple[Loss, ...]
 
     @property
     def failures(self) -> list[str]:
-        """What makes the flight a failed one."""
+        """Reasons for which the flight failed."""
         return [
             *(f"UAV {loss.uav} lost at {loss.at:.1f} s: {loss.why}" for loss in self.lost),
             *(_too_large(error) for error in self.tracking if error.too_large),
@@ -144,7 +144,7 @@ class Verdict:
 
     @property
     def remarks(self) -> list[str]:
-        """What is worth knowing of a flight that did not fail."""
+        """Remarks that do not make the flight a failed one."""
         short = self.flown < self.planned
         return [
             *([f"ended at {self.flown:g} of {self.planned:g} s"] if short else []),
@@ -155,14 +155,14 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """The closing word."""
+        """The verdict: `AS_IT_SHOULD`, `REMARKS` or `FAILED`."""
         if self.failures:
             return FAILED
         return REMARKS if self.remarks else AS_IT_SHOULD
 
     @property
     def severity(self) -> str:
-        """Of the event that tells it."""
+        """Severity of the event that reports the verdict."""
         return _SEVERITY[self.word]
 
     @property
@@ -177,7 +177,7 @@ class Verdict:
         return [_as_text(error) for error in self.tracking]
 
     def as_json(self) -> dict[str, Any]:
-        """For programs: the content of ``verdict.json``."""
+        """Return the content of ``verdict.json``."""
         found = asdict(self)
         del found["saturated"]
         return {
@@ -189,12 +189,12 @@ class Verdict:
         }
 
     def dumps(self) -> str:
-        """The same as text."""
+        """Return the content of ``verdict.json`` as text."""
         return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
 
 
 def with_unit(value: float | None, unit: str) -> str:
-    """A number with its unit, angles in degrees; "-" without one."""
+    """Return a number with its unit as text, angles in degrees; "-" for None."""
     if value is None:
         return "-"
     if unit.startswith("rad"):
@@ -216,7 +216,7 @@ def _too_large(error: TrackingError) -> str:
 
 
 def _named(found: Iterable[Any], key: str) -> Iterator[tuple[str, list[Any]]]:
-    """Findings by what they are about, the largest first."""
+    """Group findings by one of their fields; the order of first appearance stays."""
     for name in dict.fromkeys(getattr(one, key) for one in found):
         yield name, [one for one in found if getattr(one, key) == name]
 
