@@ -1,6 +1,6 @@
-"""What may stand in a scenario and in an airframe sheet: every field with its unit and range.
+"""The fields of scenarios and airframe sheets, with units and ranges.
 
-`scenario` reads the files and merges forms and variants; `mission` turns the result into what the processes are told.
+`groundside.scenario` reads the files, merges forms and variants, and turns the result into the specs of the processes.
 """
 
 from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, PointMassSheet, RateLimits, Start, record_of

@@ -1,4 +1,4 @@
-"""What may stand in an airframe sheet, and in a scenario about its aircraft: limits, lags, guards, starts."""
+"""The fields of airframe sheets, and of a scenario's aircraft: limits, lags, guards, initial states."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Record = TypeVar("Record", Airframe, PointMass)
 
 
 def _fields_for(record: Any) -> dict[str, Any]:
-    """A field of a sheet for each parameter of a record of `ftcc.link.airframe`."""
+    """Return a sheet's field for each parameter of a record of `ftcc.link.airframe`."""
     return {
         name: (
             float,
@@ -32,7 +32,7 @@ def _fields_for(record: Any) -> dict[str, Any]:
 
 
 def record_of(sheet: BaseModel, record: type[Record]) -> Record:
-    """The parameters that a sheet holds as a record of `ftcc.link.airframe`."""
+    """Return a sheet's parameters as a record of `ftcc.link.airframe`."""
     return record(**{name: float(getattr(sheet, name)) for name in record._fields})
 
 
@@ -53,7 +53,7 @@ class PointMassSheet(Strict):
 
 
 class Lag(Strict):
-    """First-order lag of each actuator, rad/s; 0 = none."""
+    """Bandwidth of each actuator's first-order lag, rad/s; 0: no lag."""
 
     thrust: float = Field(0.0, ge=0.0)
     elevator: float = Field(0.0, ge=0.0)
@@ -64,7 +64,7 @@ class Lag(Strict):
 
 
 class RateLimits(Strict):
-    """Fastest motion of each actuator, N/s, rad/s and 1/s; inf, the default: no limit."""
+    """Rate limit of each actuator, N/s, rad/s or 1/s; inf, the default: no limit."""
 
     model_config = ConfigDict(allow_inf_nan=True)
 
@@ -77,7 +77,7 @@ class RateLimits(Strict):
 
 
 class Damping(Strict):
-    """Of actuators of second order, whose ``lag`` is their natural frequency; 0: first order."""
+    """Damping ratio of second-order actuators, whose ``lag`` is the natural frequency; 0: first order."""
 
     thrust: float = Field(0.0, ge=0.0, lt=1.0)
     elevator: float = Field(0.0, ge=0.0, lt=1.0)
@@ -88,7 +88,7 @@ class Damping(Strict):
 
 
 class Limits(Strict):
-    """Travel of each actuator: [lowest, highest], N, rad, and load factor."""
+    """Travel of each actuator: [lowest, highest], N, rad or load factor."""
 
     thrust: tuple[float, float] | None = None
     elevator: tuple[float, float] | None = None
@@ -107,7 +107,7 @@ class Limits(Strict):
 
 
 class Guards(Strict):
-    """Where the model ends: beyond these an aircraft counts as lost."""
+    """Limits of the model's valid range: an aircraft beyond them counts as lost."""
 
     least_airspeed: float = Field(3.0, gt=0.0, description="m/s")
     flight_path_angle: float = Field(1.5, gt=0.0, lt=1.5708, description="rad")
@@ -116,7 +116,7 @@ class Guards(Strict):
 
 
 class AutothrottleFields(Strict):
-    """The vehicle's own speed hold, in place of the commanded thrust: thrust + gain (airspeed - V)."""
+    """The vehicle's own speed hold, which replaces the commanded thrust: thrust + gain (airspeed - V)."""
 
     airspeed: float = Field(gt=0.0, description="m/s")
     gain: float = Field(gt=0.0, description="N per m/s")
@@ -126,25 +126,25 @@ class AutothrottleFields(Strict):
 class Plant(Strict):
     """Options of the true aircraft."""
 
-    model: str | None = Field(None, description="which plant flies; default: the one that the scheme is made for")
+    model: str | None = Field(None, description="name of the plant; default: the plant of the scheme")
     coefficients: dict[str, float] = Field(
-        {}, description="factors of the true aircraft's aerodynamic coefficients, of which laws know nothing, by name"
+        {}, description="factor on each true aerodynamic coefficient, by name; the laws' nominal model stays"
     )
     elevator_lift: bool = Field(True, description="false: CLde = 0")
     lag: Lag = Lag()
     damping: Damping = Damping()
-    delay: int = Field(0, ge=0, le=10, description="samples by which a command acts later than it has to")
+    delay: int = Field(0, ge=0, le=10, description="samples, additional delay of a command")
     limits: Limits
     rate_limits: RateLimits = RateLimits()
     autothrottle: AutothrottleFields | None = None
     fault: Literal["after_lag", "before_lag"] = "after_lag"
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
         "trim",
-        description="position, and command in force before the first one has come through; N, rad. With trim and a "
-        "delay the first command counts as all that came before it; between processes it comes a sample after t = 0",
+        description="N, rad: position, and command before the first one arrives. With trim and a delay, the first "
+        "command also replaces all earlier ones; between processes it arrives one sample after t = 0",
     )
     guards: Guards = Guards()
-    beyond_limits: bool = Field(False, description="true: fly although a healthy aircraft has no level trim in travel")
+    beyond_limits: bool = Field(False, description="true: fly even if a healthy aircraft has no level trim")
 
 
 class Start(Strict):
@@ -166,6 +166,6 @@ class Start(Strict):
 
 
 class Starts(Start):
-    """State of the followers at t = 0, and where single UAVs differ."""
+    """State of the followers at t = 0, with exceptions by UAV."""
 
     uav: dict[Id, Start] = {}

@@ -1,4 +1,4 @@
-"""What all tables of a scenario have in common."""
+"""Types that all tables of a scenario use."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 
 
 class Strict(BaseModel):
-    """Fields that are not listed, nan and inf are refused."""
+    """A table that refuses unknown fields, nan and inf."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -27,7 +27,7 @@ Table = TypeVar("Table", bound=Strict)
 
 
 def extended(fields: Mapping[str, Any]) -> Callable[[type[Table]], type[Table]]:
-    """Class decorator: the table with ``fields`` (by name: type and `Field`) behind its own, as pydantic makes them."""
+    """Return a class decorator that adds ``fields`` (name: (type, `Field`)) after a table's own fields."""
 
     def extend(table: type[Table]) -> type[Table]:
         described: dict[str, Any] = {"__base__": table, "__module__": table.__module__, "__doc__": table.__doc__}
@@ -37,6 +37,6 @@ def extended(fields: Mapping[str, Any]) -> Callable[[type[Table]], type[Table]]:
 
 
 def check_end(at: float, until: float | None) -> None:
-    """Refuse an event that ends before, or when, it begins; raises ValueError."""
+    """Raise ValueError for an event that does not end after its beginning (times in s)."""
     if until is not None and until <= at:
         raise ValueError(f"until = {until:g} must be later than at = {at:g}")

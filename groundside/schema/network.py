@@ -1,4 +1,4 @@
-"""What may stand in a scenario about who hears whom: graph, channel, and what happens to links."""
+"""The fields of communication: graph, channel, and link events."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ class ChannelFields(Strict):
     """Quality of the radio links."""
 
     loss: Probability = Field(0.0, description="probability of loss of a record, independent")
-    burst_start: Probability = Field(0.0, description="probability per record of entering a burst")
-    burst_end: Probability = Field(1.0, description="probability per record of leaving it")
+    burst_start: Probability = Field(0.0, description="probability per record that a burst begins")
+    burst_end: Probability = Field(1.0, description="probability per record that a burst ends")
     burst_loss: Probability = Field(1.0, description="probability of loss within a burst")
-    delay: float = Field(0.0, ge=0.0, description="s, beyond the link latency")
+    delay: float = Field(0.0, ge=0.0, description="s, in addition to the link latency")
     jitter: float = Field(0.0, ge=0.0, description="s, further delay, uniform in [0, jitter]")
 
 
@@ -61,7 +61,7 @@ class LinkEventFields(Strict):
     """A change of the radio of one UAV, or of one edge, from ``at`` to ``until``."""
 
     at: float = Field(ge=0.0, description="s")
-    until: float | None = Field(None, description="s; without it the change is for good")
+    until: float | None = Field(None, description="s; default: the change is permanent")
     kind: Literal["cut", "degrade"]
     uav: Id | None = None
     edge: tuple[Id, Id] | None = Field(None, description="[sender, receiver]")

@@ -1,4 +1,4 @@
-"""What may stand in a scenario: everything together, and the claims that its flight must meet."""
+"""The fields of a whole scenario, and of its claims."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ __all__ = ["Claim", "Plan", "Rates", "fields_of"]
 
 
 class Uavs(Strict):
-    """Who flies: ids, leaders after followers."""
+    """Ids of the UAVs."""
 
     followers: list[Id] = Field(min_length=1)
     leaders: list[Id] = []
 
 
 class Rates(Strict):
-    """The time grid. Ideal exchange (form "monograph") has no exchange period and no latency of its own."""
+    """The time grid. Ideal exchange (form "monograph") has neither an exchange period nor a latency."""
 
     control_rate: float = Field(gt=0.0, le=2000.0, description="Hz; the period is whole microseconds")
-    exchange_rate: float | None = Field(None, gt=0.0, le=2000.0, description="Hz, records to the neighbours")
+    exchange_rate: float | None = Field(None, gt=0.0, le=2000.0, description="Hz, rate of records to the neighbours")
     latency: float | None = Field(None, ge=0.0, description="s, link latency; default: one exchange period")
     plant_step: float = Field(0.001, gt=0.0, le=0.01, description="s, integration step of the plant")
 
 
 class GainFields(BaseModel):
-    """Gains of the scheme by name, and where single UAVs differ."""
+    """Gains of the scheme by name, with exceptions by UAV."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, float]
@@ -43,31 +43,33 @@ class GainFields(BaseModel):
 
     @property
     def common(self) -> dict[str, float]:
-        """Those of all UAVs, as far as the file gives them."""
+        """Gains of all UAVs that the file gives."""
         return dict(self.__pydantic_extra__)
 
 
 class MissionFields(Strict):
-    """What every follower knows without being told."""
+    """Values that every follower knows from the start."""
 
     V: float = Field(gt=0.0, description="m/s, the mission's speed")
 
 
 class Claim(Strict):
-    """A number that a flight must show. ``expected`` is keyed by case; a case that is not listed has no such claim."""
+    """A number that a flight must show. ``expected`` has a value per case; a case that is missing has no such claim."""
 
     name: str
     metric: str
     signal: str = Field(description="arithmetic expression over columns of the recording")
     uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
     window: tuple[float, float] = Field(description="s, both ends included")
-    within: list[tuple[float, float]] = Field([], description="s, parts of the window that alone count; default: all")
-    threshold: float | dict[str, float] | None = Field(None, description="for the metrics that need one; by case")
+    within: list[tuple[float, float]] = Field([], description="s, evaluated parts of the window; default: all of it")
+    threshold: float | dict[str, float] | None = Field(
+        None, description="number, or one per case; some metrics need it"
+    )
     unit: str = ""
     source: str
     expected: dict[str, float | list[float]]
     tolerance: str | dict[str, str] = Field(
-        description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; by case'
+        description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; one text, or by case'
     )
 
     @model_validator(mode="after")
@@ -81,13 +83,13 @@ class Claim(Strict):
 
 
 class FlownRun(Strict):
-    """The run that recorded a scenario."""
+    """The run that recorded the scenario."""
 
-    started: AwareDatetime = Field(description="simulated time 0 in exported tracks and logs")
+    started: AwareDatetime = Field(description="date and time of simulated time 0 in exported tracks and logs")
 
 
 class Flown(Strict):
-    """How a scenario that a run recorded came about."""
+    """Origin of a scenario in a run's folder."""
 
     name: str
     form: str
@@ -121,7 +123,7 @@ class Plan(Strict):
     turbulence: TurbulenceFields | None = None
     leaders: dict[Id, LeaderFields] = {}
     obstacles: list[ObstacleFields] = []
-    detection_range: float | None = Field(None, gt=0.0, description="m, at which the leaders detect an obstacle ahead")
+    detection_range: float | None = Field(None, gt=0.0, description="m, range at which leaders detect an obstacle")
     gains: GainFields = GainFields()
     switches: dict[str, bool] = {}
     disturbances: list[DisturbanceFields] = []
@@ -134,5 +136,5 @@ class Plan(Strict):
 
 
 def fields_of(model: Any) -> list[str]:
-    """Names of the fields of a model as they stand in a file."""
+    """Return the names of a model's fields as they are written in a file."""
     return [field.alias or name for name, field in model.model_fields.items()]

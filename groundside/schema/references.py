@@ -1,4 +1,4 @@
-"""What may stand in a scenario about where to fly: leaders and their profiles, attitudes."""
+"""The fields of references: leaders' profiles and attitude commands."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ __all__ = ["AttitudeFields", "LeaderFields"]
 
 
 class Filter(Strict):
-    """Second-order filter."""
+    """Second-order filter: natural frequency and damping ratio."""
 
     frequency: float = Field(gt=0.0, description="rad/s")
     damping: float = Field(gt=0.0)
 
 
 class CommandFields(Strict):
-    """From ``at`` on, or once leader ``uav`` has passed ``x``: another altitude, another speed.
+    """A new altitude or speed, from ``at`` on or after leader ``uav`` has passed ``x``.
 
-    From ``until`` on what was commanded before is commanded again.
+    From ``until`` on, the earlier command applies again.
     """
 
     at: float | None = Field(None, ge=0.0, description="s")
-    until: float | None = Field(None, description="s, goes with at; default: until the next command")
+    until: float | None = Field(None, description="s, needs at; default: the next command")
     uav: Id | None = None
     x: float | None = Field(None, description="m, forward position")
-    altitude: float | None = Field(None, description="m; default: as before")
-    speed: float | None = Field(None, gt=0.0, description="m/s; default: as before")
+    altitude: float | None = Field(None, description="m; default: unchanged")
+    speed: float | None = Field(None, gt=0.0, description="m/s; default: unchanged")
 
     @model_validator(mode="after")
     def _by_time_or_position(self) -> Self:
@@ -71,24 +71,24 @@ class LeaderFields(Strict):
     speed_wave: WaveFields | None = None
     over_obstacles: list[float] = Field(
         [],
-        description="m, altitude at which to pass each obstacle, from its detection until all leaders are past it; "
-        "elsewhere that of the start",
+        description="m, altitude over each obstacle, from its detection until all leaders have passed it; "
+        "elsewhere the initial altitude",
     )
-    forward: bool = Field(False, description="speeds are forward speeds instead of airspeeds")
+    forward: bool = Field(False, description="true: speeds are forward speeds, not airspeeds")
     climb_limit: float | None = Field(
-        None, gt=0.0, description="m/s, largest climb rate of the profile; default: what the followers can follow"
+        None, gt=0.0, description="m/s, largest climb rate of the profile; default: the followers' limit"
     )
-    sink_limit: float | None = Field(None, gt=0.0, description="m/s, largest sink rate; default likewise")
+    sink_limit: float | None = Field(None, gt=0.0, description="m/s, largest sink rate; default: the followers' limit")
 
 
 class AttitudeCommandFields(Strict):
-    """From ``at`` on: another commanded attitude with respect to the velocity; what is not given stays.
+    """A new commanded attitude relative to the velocity, from ``at`` on; angles that are not given stay.
 
-    From ``until`` on the attitude that was commanded before is commanded again.
+    From ``until`` on, the earlier attitude is commanded again.
     """
 
     at: float = Field(ge=0.0, description="s")
-    until: float | None = Field(None, description="s; default: until the next command")
+    until: float | None = Field(None, description="s; default: the next command")
     bank: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
     alpha: float | None = Field(None, gt=-1.5, lt=1.5, description="rad, angle of attack")
     sideslip: float | None = Field(None, gt=-1.5, lt=1.5, description="rad")
@@ -103,7 +103,7 @@ class AttitudeCommandFields(Strict):
 
 
 class AttitudeFields(Strict):
-    """The attitude that each UAV refers to by itself: commands through a second-order filter."""
+    """Each UAV's own attitude reference: commands through a second-order filter."""
 
     filter: Filter = Filter(frequency=0.9, damping=0.3)
     commands: list[AttitudeCommandFields] = Field(min_length=1)

@@ -1,4 +1,4 @@
-"""What may stand in a scenario about moving air: mean wind, discrete gusts, turbulence."""
+"""The fields of moving air: mean wind, discrete gusts, turbulence."""
 
 from __future__ import annotations
 
@@ -12,30 +12,28 @@ __all__ = ["GustFields", "TurbulenceFields", "WindFields"]
 
 
 class WindFields(Strict):
-    """Wind and gust, eq. (9.33): along the track on plant "position", blowing north on all others."""
+    """Wind and gust, eq. (9.33): along the track for plant "position", towards north for all others."""
 
     mean: float = Field(0.0, ge=0.0, description="m/s, V_m")
     gust: float = Field(0.0, ge=0.0, description="m/s, standard deviation of A, drawn for each UAV")
-    gust_period: float = Field(0.1, ge=0.001, description="s, for which a draw is held")
+    gust_period: float = Field(0.1, ge=0.001, description="s, time for which a drawn value is held")
 
 
 class GustFields(Strict):
     """A discrete 1-cosine gust: amplitude (1 - cos(pi x / length)) / 2 over the distance x flown since ``at``.
 
-    It then holds, as MIL-F-8785C (3.7.1.3) defines it, and from ``until`` on falls as it has risen. ``held = false`` is
-    the whole 1-cosine of CS-25.341, which falls at once; ``length`` then is its gradient distance H.
+    It then stays constant, as in MIL-F-8785C (3.7.1.3), and from ``until`` on falls in the way it rose.
+    ``held = false`` is the whole 1-cosine of CS-25.341, which falls at once; ``length`` is its gradient distance H.
     """
 
     at: float = Field(ge=0.0, description="s")
-    until: float | None = Field(None, description="s, from which on it falls; without it the gust is for good")
+    until: float | None = Field(None, description="s, time from which it falls; default: it never falls")
     along: float = Field(0.0, description="m/s, amplitude along the track; tail wind > 0")
     right: float = Field(0.0, description="m/s, amplitude towards the right")
     up: float = Field(0.0, description="m/s, amplitude upwards")
-    length: float = Field(gt=0.0, description="m, d_m")
+    length: float = Field(gt=0.0, description="m, gust length d_m")
     held: bool = Field(True, description="false: it falls as soon as it has risen")
-    airspeed: float | None = Field(
-        None, gt=0.0, description="m/s, with which it is flown through; default: the start's V"
-    )
+    airspeed: float | None = Field(None, gt=0.0, description="m/s, airspeed through it; default: the initial V")
     uavs: list[Id] | None = Field(None, min_length=1, description="default: all followers")
 
     @model_validator(mode="after")
@@ -57,14 +55,12 @@ class TurbulenceFields(Strict):
     sigma: tuple[NotNegative, NotNegative, NotNegative] | None = Field(
         None, description="m/s, standard deviations along the track, to the right, up"
     )
-    length: tuple[Positive, Positive, Positive] | None = Field(None, description="m, L_u, L_v, L_w")
+    length: tuple[Positive, Positive, Positive] | None = Field(None, description="m, scale lengths L_u, L_v, L_w")
     wind_20ft: float | None = Field(None, gt=0.0, description="m/s, wind at 20 ft above the ground")
     altitude: float | None = Field(
         None, ge=3.048, le=304.8, description="m above the ground, 10 to 1000 ft; the same for the whole flight"
     )
-    airspeed: float | None = Field(
-        None, gt=0.0, description="m/s, with which it is flown through; default: the start's V"
-    )
+    airspeed: float | None = Field(None, gt=0.0, description="m/s, airspeed through it; default: the initial V")
     uavs: list[Id] | None = Field(None, min_length=1, description="default: all followers")
 
     @model_validator(mode="after")

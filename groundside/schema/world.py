@@ -1,4 +1,4 @@
-"""What may stand in a scenario about what surrounds and befalls aircraft: obstacles, disturbances, faults, noise."""
+"""The fields of the surroundings and faults: obstacles, disturbances, faults, home, noise."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ __all__ = ["DisturbanceFields", "FaultFields", "HomeFields", "NoiseFields", "Obs
 
 
 class ObstacleFields(Strict):
-    """A zone along the flight that is to be passed above."""
+    """A zone along the flight that UAVs must pass above."""
 
-    x: tuple[float, float] = Field(description="m, from and to this forward position")
-    top: float = Field(description="m, altitude")
+    x: tuple[float, float] = Field(description="m, forward positions of its beginning and end")
+    top: float = Field(description="m, altitude of its top")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -26,23 +26,22 @@ class ObstacleFields(Strict):
 
 
 class DisturbanceFields(Strict):
-    """Disturbances from ``at`` to ``until``, as far as the plant has them: constant, or oscillating at ``frequency``.
+    """Disturbances of the plant from ``at`` to ``until``: constant, or oscillating at ``frequency``.
 
-    Each value then is the amplitude of value * sin(frequency * (t - at) + phase). The onset grows towards it; the end
-    is a step.
+    An oscillating one is value * sin(frequency * (t - at) + phase). The onset is exponential, the end is a step.
     """
 
     at: float = Field(ge=0.0, description="s")
-    until: float | None = Field(None, description="s, when it ends, as a step; without it the disturbance is for good")
-    d1: float = Field(0.0, description="m/s^2, of the airspeed")
-    d2: float = Field(0.0, description="rad/s, of the flight-path angle")
-    d3: float = Field(0.0, description="rad/s^2, of the pitch rate")
+    until: float | None = Field(None, description="s, end, as a step; default: the disturbance is permanent")
+    d1: float = Field(0.0, description="m/s^2, added to the rate of the airspeed")
+    d2: float = Field(0.0, description="rad/s, added to the rate of the flight-path angle")
+    d3: float = Field(0.0, description="rad/s^2, added to the pitch acceleration")
     b_x: float = Field(0.0, description="m/s^2, north")
     b_y: float = Field(0.0, description="m/s^2, east")
     b_z: float = Field(0.0, description="m/s^2, up")
     onset: float = Field(0.0, ge=0.0, description="1/s, rate of the exponential onset; 0 = step")
     frequency: float | None = Field(None, gt=0.0, description="rad/s, of an oscillation; default: constant")
-    phase: float = Field(0.0, description="rad, of an oscillation at its beginning")
+    phase: float = Field(0.0, description="rad, phase of an oscillation at its beginning")
     uavs: list[Id] | None = Field(None, description="default: all followers")
 
     @model_validator(mode="after")
@@ -54,13 +53,13 @@ class DisturbanceFields(Strict):
 
     @property
     def values(self) -> dict[str, float]:
-        """The disturbances that are not zero, by name."""
+        """The nonzero disturbances, by name."""
         given = {name: getattr(self, name) for name in ("d1", "d2", "d3", "b_x", "b_y", "b_z")}
         return {name: value for name, value in given.items() if value != 0.0}
 
 
 class FaultFields(Strict):
-    """From ``at`` on an ``actuator``, or the ``navigation`` solution, fails, until another fault of it, or ``until``.
+    """A fault of an ``actuator`` or of the ``navigation`` solution, from ``at`` to its next fault or to ``until``.
 
     At ``until`` it is repaired, as by ``kind = "ok"``; another fault of the same part may begin only then.
 
@@ -71,7 +70,7 @@ class FaultFields(Strict):
     """
 
     at: float = Field(ge=0.0, description="s")
-    until: float | None = Field(None, description="s, when it is repaired; without it the fault is for good")
+    until: float | None = Field(None, description="s, time of repair; default: the fault is permanent")
     uav: Id
     actuator: Actuator | None = None
     navigation: Literal["position", "attitude"] | None = None
@@ -81,11 +80,11 @@ class FaultFields(Strict):
     effectiveness_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
     bias_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
     slew: float | None = Field(None, gt=0.0, description="rad/s or N/s, largest rate of a slow actuator")
-    period: float | None = Field(None, gt=0.0, description="s, of intermittent faults and of slow navigation")
+    period: float | None = Field(None, gt=0.0, description="s, period of intermittent faults and of slow navigation")
     duty: Probability | None = Field(None, description="healthy share of the period")
     offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m; roll, pitch, yaw, rad")
     rate_offset: tuple[float, float, float] = Field((0.0,) * 3, description="north, east, down, m/s; p, q, r, rad/s")
-    without_trim: bool = Field(False, description="true: fly it although it leaves no level trim")
+    without_trim: bool = Field(False, description="true: fly even if the fault leaves no level trim")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -111,7 +110,7 @@ class FaultFields(Strict):
 
 
 class HomeFields(Strict):
-    """Where on earth the origin of the local frame lies, for the maps of ground stations."""
+    """Position of the local frame's origin on earth, for the maps of ground stations."""
 
     latitude: float = Field(47.3977, ge=-85.0, le=85.0, description="deg")
     longitude: float = Field(8.5456, ge=-180.0, le=180.0, description="deg")
@@ -131,7 +130,7 @@ class NoiseFields(Strict):
     In the vertical plane either ``alpha`` or ``theta`` is given: the one follows from the other.
     """
 
-    factor: float = Field(1.0, ge=0.0, description="multiplies all of them")
+    factor: float = Field(1.0, ge=0.0, description="factor on all standard deviations")
 
     @property
     def deviations(self) -> dict[str, float]:

@@ -45,7 +45,7 @@ _CLOSE = 1e-6
 
 _HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
           "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
-"""With several leaders, followers must be between their altitudes, and those with ``x_d`` also between their positions."""
+"""Followers of several leaders must be between their altitudes and, if they track ``x_d``, between their positions."""
 
 
 def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
