@@ -62,9 +62,7 @@ class Claim(Strict):
     uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
     window: tuple[float, float] = Field(description="s, both ends included")
     within: list[tuple[float, float]] = Field([], description="s, evaluated parts of the window; default: all of it")
-    threshold: float | dict[str, float] | None = Field(
-        None, description="number, or one per case; some metrics need it"
-    )
+    threshold: float | dict[str, float] | None = Field(None, description="a number, or one per case")
     unit: str = ""
     source: str
     expected: dict[str, float | list[float]]
