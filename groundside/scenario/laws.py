@@ -80,14 +80,14 @@ def check_scheme(
     speeds = {p.V for p in profiles.values()}
     speeds |= {command.speed for p in profiles.values() for command in p.commands}
     speeds |= {trigger.speed for p in profiles.values() for trigger in p.triggers}
-    known = {plan.mission.V} if plan.mission is not None else set()
+    mission_speed = {plan.mission.V} if plan.mission is not None else set()
     flight = Flight(
         graph=graph,
         period=timing.period,
         exchange_period=timing.exchange_us / 1e6,
         latency=timing.latency_us / 1e6,
         leader_climb=max((max(pair) for pair in climb_range(profiles, plan.duration).values()), default=0.0),
-        leader_speed_varies=bool(speeds - known) or any(p.speed_wave for p in profiles.values()),
+        leader_speed_varies=bool(speeds - mission_speed) or any(p.speed_wave for p in profiles.values()),
         leader_acceleration=largest_acceleration(profiles, plan.duration),
         initial={vehicle.uav: _motion(vehicle) for vehicle in vehicles if vehicle.uav in graph.followers},
         initial_errors=_initial_errors(scheme, vehicles, references),
@@ -119,15 +119,15 @@ def initial_shared_values(
     """
     if not scheme.briefed:
         return {}
-    known = {}
+    values = {}
     for vehicle in vehicles:
         profile = profiles.get(vehicle.uav)
         if profile is None:
             role, motion = "follower", _motion(vehicle)
         else:
             role, motion = "leader", Reference(profile.x, profile.V, 0.0, profile.z, 0.0, 0.0, profile.V)
-        known[vehicle.uav] = tuple(float(getattr(motion, quantity.name)) for quantity in scheme.shared[role])
-    return known
+        values[vehicle.uav] = tuple(float(getattr(motion, quantity.name)) for quantity in scheme.shared[role])
+    return values
 
 
 def _initial_errors(
