@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ftcc.groundside.dashboard import Dashboard
-from tests import rrd
 from tests.groundside.dashboard.synthetic_swarm import SUBJECT
+from tests.support import rrd
 
 DURATION = 32.0
 """Of the flight in the fixture ``recording``, s."""

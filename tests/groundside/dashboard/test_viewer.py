@@ -19,9 +19,9 @@ import rerun as rr
 
 from ftcc.groundside.dashboard import Dashboard
 from ftcc.groundside.dashboard.viewer import Entry, Viewer
-from tests import rrd
 from tests.groundside.dashboard.recorded import make, rows
 from tests.groundside.dashboard.synthetic_swarm import flight, snapshot
+from tests.support import rrd
 
 STATION = """
 import sys, time
