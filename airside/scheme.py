@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 import importlib
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, Literal, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ __all__ = [
     "Problem",
     "Quantity",
     "Reference",
+    "Role",
     "Scheme",
     "SchemeError",
     "quantities",
@@ -42,7 +44,8 @@ class Quantity:
 
     ``published`` is the monograph's value of a gain, None where the monograph has none. ``bound`` names the signal
     (or gives the constant) that limits this one, for display. ``follows`` names what of the mission a gain follows
-    unless it is given, see `FOLLOWED`.
+    unless it is given, see `FOLLOWED`. ``role`` is what a signal is to those who plot and judge it; None: as its
+    ``meaning`` says, see `shown_as`.
     """
 
     name: str
@@ -51,7 +54,26 @@ class Quantity:
     published: float | None = None
     bound: float | str | None = None
     follows: str = ""
+    role: Role | None = None
 
+    @property
+    def shown_as(self) -> Role:
+        """The role that dashboard, report and verdict go by: the declared one, or the one its ``meaning`` names."""
+        if self.role is not None:
+            return self.role
+        found = (role for role, words in _ROLE_WORDS.items() if re.search(words, self.meaning))
+        return next(found, "plain")
+
+
+Role = Literal["error", "estimate", "adapted", "reference", "plain"]
+"""What a signal is to those who plot and judge it."""
+_ROLE_WORDS: dict[Role, str] = {
+    "error": r"error",
+    "estimate": r"^(estimated (disturbance|effect|lumped)|unexplained)",
+    "adapted": r"network|adapted|weights",
+    "reference": r"^reference,",
+}
+"""By role, the words in a meaning that stand for it where none is declared; the first that fits."""
 
 FOLLOWED = {"leaders.z": "mean altitude of the leaders at the start, m"}
 """What gains may follow."""

@@ -1,15 +1,13 @@
 """Choose the plots of a swarm from the signals that its scheme declares, so that a user's own scheme is shown, too.
 
-An error is a signal with a bound, or with "error" in its meaning. An estimate is a signal whose meaning begins with
-"estimated disturbance", "estimated effect", "estimated lumped" or "unexplained"; if its name is NAME_hat and the plant
-has a disturbance NAME, the true value is drawn with it. An adapted quantity has "network", "adapted" or "weights" in
-its meaning.
+A signal is plotted by its role (`ftcc.airside.scheme.Quantity.shown_as`): error, estimate, adapted; a signal with a
+bound is an error, too. If an estimate's name is NAME_hat and the plant has a disturbance NAME, the true value is drawn
+with it.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -142,7 +140,7 @@ def _motion(subject: Subject) -> list[Panel]:
 
 def _errors(subject: Subject) -> list[Panel]:
     found = [s for s in subject.signals if s.bound is not None]
-    found += [s for s in subject.signals if s.bound is None and "error" in s.meaning and s.unit != "-"]
+    found += [s for s in subject.signals if s.bound is None and s.shown_as == "error" and s.unit != "-"]
     return [
         Panel(f"/plots/errors/{s.name}", _title(s), s.unit, ("signals", s.name), bound=s.bound) for s in found[:_MOST]
     ]
@@ -167,7 +165,7 @@ def _estimates(subject: Subject) -> list[Panel]:
     disturbances = dict(subject.disturbances)
     panels = []
     for signal in subject.signals:
-        if not re.match(r"(estimated (disturbance|effect|lumped)|unexplained)", signal.meaning):
+        if signal.shown_as != "estimate":
             continue
         stem = signal.name.removesuffix("_hat")
         true: Where | None = ("disturbances", stem) if stem in disturbances and stem != signal.name else None
@@ -197,7 +195,7 @@ def _effectiveness(subject: Subject) -> list[Panel]:
 
 
 def _adaptation(subject: Subject) -> list[Panel]:
-    adapted = [s for s in subject.signals if re.search(r"network|adapted|weights", s.meaning)]
+    adapted = [s for s in subject.signals if s.shown_as == "adapted"]
     return [Panel(f"/plots/adaptation/{s.name}", _title(s), s.unit, ("signals", s.name)) for s in adapted[:8]]
 
 

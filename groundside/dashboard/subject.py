@@ -50,7 +50,7 @@ class Subject:
         follower = next(spec for spec in mission.vehicles if spec.kind != "reference_point")
         return cls(
             title=mission.title,
-            family=_family(mission.scheme.plant, mission.graph),
+            family=_family(mission),
             graph=mission.graph,
             signals=mission.scheme.signals,
             limits={name: follower.limits[SLOT[name]] for name in mission.scheme.commands},
@@ -70,9 +70,9 @@ class Subject:
         return tuple(sorted(self.graph.leaders))
 
 
-def _family(plant: str, graph: Graph) -> Family:
-    if plant == "attitude":
+def _family(mission: Mission) -> Family:
+    if mission.scheme.plant == "attitude":
         return "attitude"
-    if plant == "position":
+    if mission.fire is not None:
         return "fire"
-    return "containment" if len(graph.leaders) > 1 else "formation"
+    return "containment" if len(mission.graph.leaders) > 1 else "formation"

@@ -153,7 +153,7 @@ def plain_sheet(mission: Mission) -> Sheet:
         panel = Panel(y=signal.name, label=signal.meaning or signal.name, unit=signal.unit)
         if signal.bound is not None:
             errors.append(panel.model_copy(update={"bound": str(signal.bound)}))
-        elif "error" in signal.meaning:
+        elif signal.shown_as == "error":
             errors.append(panel)
         elif signal.name.endswith("_hat"):
             estimates.append(panel)

@@ -258,7 +258,7 @@ def _commanded_frequencies(flight: _Flight) -> list[float]:
     as an intermittent fault.
     """
     signals = flight.signals
-    own = [s.name for s in flight.mission.scheme.signals if s.meaning.startswith("reference,")]
+    own = [s.name for s in flight.mission.scheme.signals if s.shown_as == "reference"]
     conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
     columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in ("z", "V")]
     columns += [(uav, name) for name in own + conditions for uav in flight.followers]

@@ -185,3 +185,36 @@ def test_a_gain_that_nobody_gave_a_value_must_be_given(containment):
 def test_a_range_of_a_gain_that_there_is_not_is_refused(containment):
     with pytest.raises(SchemeError, match="RANGES name k99, which are no gains"):
         Scheme("mine", file_like(containment, RANGES={FEEDBACK: "k11 k99"}))
+
+
+ROLES = {
+    "attitude_synchronization": {
+        "estimate": ["d_p", "d_q", "d_r"],
+        "adapted": ["theta1", "theta2"],
+        "reference": ["mu_d", "alpha_d", "beta_d"],
+    },
+    "containment": {"error": ["S1", "S5"], "estimate": ["d1_hat", "d2_hat", "lumped_hat"]},
+    "fire_monitoring": {
+        "error": ["Pt_x", "Pt_y", "Pt_z", "e_x", "e_y", "e_z"],
+        "estimate": ["Dhat_x", "Dhat_y", "Dhat_z"],
+        "reference": ["x_ref", "y_ref", "z_ref"],
+    },
+    "prescribed_performance": {"error": ["E2"], "adapted": ["F_gamma", "F_q"]},
+}
+"""Signals without a bound, by scheme and role."""
+
+
+@pytest.mark.parametrize("scheme", ROLES)
+def test_signals_have_the_roles_by_which_they_are_plotted_and_judged(scheme):
+    """A meaning that is worded anew must not take a plot away."""
+    found: dict[str, list[str]] = {}
+    for signal in schemes.find(scheme).signals:
+        if signal.shown_as != "plain" and signal.bound is None:
+            found.setdefault(signal.shown_as, []).append(signal.name)
+    assert found == ROLES[scheme]
+
+
+def test_a_declared_role_counts_more_than_words():
+    assert Quantity("e", "m", "tracking error").shown_as == "error"
+    assert Quantity("e", "m", "tracking error", role="plain").shown_as == "plain"
+    assert Quantity("r", "rad/s^2", "what the control does not explain", role="estimate").shown_as == "estimate"
