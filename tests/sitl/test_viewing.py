@@ -163,7 +163,7 @@ def test_who_watches_late_sees_the_past_and_the_run_stays_whole(fly: Callable[..
     assert [event.text for event in told] == [event.text for snapshot in drawn for event in snapshot.events]
     flight.wait_until(lambda: "disturbance" in flight.output)  # at 25 s
     flight.interrupt()
-    assert flight.wait() == 0
+    assert flight.wait() == 0, flight.output
     assert Run(flight.folder).end > 24.0 > drawn[-1].t
 
 
