@@ -10,7 +10,7 @@ from ftcc.airside.scheme import Scheme, SchemeError
 from ftcc.airside.schemes import find as find_scheme
 from ftcc.groundside.claims import check_expression
 from ftcc.groundside.scenario.columns import LEADING
-from ftcc.groundside.scenario.loading import Scenario, whole
+from ftcc.groundside.scenario.loading import Scenario
 from ftcc.groundside.schema import Plan, Rates, Start
 from ftcc.link.actuators import ACTUATORS, SLOT
 from ftcc.link.graph import Graph, GraphError
@@ -113,7 +113,7 @@ def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
     latency = 0.0
     if wire:
         latency = rates.latency * 1e6 if rates.latency is not None else exchange
-        if not whole(exchange / period):
+        if not _is_whole(exchange / period):
             findings.refuse(
                 f"rates.exchange_rate = {rates.exchange_rate:g}: a period of {exchange / 1e3:g} ms; "
                 f"must be a multiple of the control period of {period / 1e3:g} ms"
@@ -136,7 +136,7 @@ def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
         if rates.latency:
             findings.refuse(f"rates.latency = {rates.latency:g}: form {IDEAL} has no latency; leave it out")
     every = rates.control_rate / plan.record_rate
-    if not whole(every) or every < 1.0 - 1e-9:
+    if not _is_whole(every) or every < 1.0 - 1e-9:
         findings.refuse(
             f"record_rate = {plan.record_rate:g}: control_rate = {rates.control_rate:g} must be a whole multiple of it"
         )
@@ -167,7 +167,7 @@ def _check_grid(rates: Rates, period: float, step: float, wire: bool, findings: 
         findings.refuse(f"{where}must be at least {least / 1e3:g} ms{why}")
     if abs(step - round(step)) > _OFF_GRID:
         findings.refuse(f"rates.plant_step = {rates.plant_step:g}: must be whole microseconds")
-    elif not whole(period / step):
+    elif not _is_whole(period / step):
         findings.refuse(
             f"rates.plant_step = {rates.plant_step:g}: must divide the control period of {period / 1e3:g} ms "
             f"into whole steps"
@@ -302,3 +302,8 @@ def _check_names(plan: Plan, plant: ModuleType, findings: Findings) -> None:
                 findings.refuse(
                     f"disturbances.{n}.{name}: the plant has no such disturbance; it has {', '.join(channels)}"
                 )
+
+
+def _is_whole(value: float, tolerance: float = 1e-6) -> bool:
+    """Whether a positive number is whole but for rounding."""
+    return math.isfinite(value) and abs(value - round(value)) <= tolerance * max(1.0, abs(value))

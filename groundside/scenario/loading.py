@@ -8,15 +8,11 @@ line. Tables are merged, everything else is replaced.
 
 from __future__ import annotations
 
-import math
 import tomllib
-import typing
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ValidationError
+from typing import Any
 
 from ftcc.groundside.scenario.catalogue import (
     Contents,
@@ -28,13 +24,12 @@ from ftcc.groundside.scenario.catalogue import (
     shipped,
 )
 from ftcc.groundside.scenario.places import Layer, Places
-from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet, fields_of
+from ftcc.groundside.scenario.validation import located_error, shortened, validate
+from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 
 __all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
 
 _VARIANT_KEYS = ("title", "forms", "claims_of")
-
-M = TypeVar("M", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -61,7 +56,7 @@ class Scenario:
 
     def error(self, problems: Sequence[str]) -> ScenarioError:
         """What is to be raised where these are wrong with it."""
-        return _error(self.file, problems, self.places)
+        return located_error(self.file, problems, self.places)
 
 
 def load(
@@ -95,60 +90,89 @@ def load(
     contents = contents_of(path)
     document = contents.document
     _require_tables(path, document)
-    known_forms, known_variants = forms_and_variants(document)
-    flown = "flown" in document
-    if flown and (variants or form not in (None, known_forms[0])):
-        raise ScenarioError(
-            path,
-            [f"is the scenario of a flight in form {known_forms[0]}: choose forms and variants from the original file"],
-        )
-    chosen = form or known_forms[0]
-    if chosen not in known_forms:
-        raise ScenarioError(path, [f"form = {chosen!r}: there is no such form; there are {', '.join(known_forms)}"])
-    unknown = [name for name in variants if name not in known_variants]
-    if unknown:
-        there_are = f"there are {', '.join(known_variants)}" if known_variants else "the file has none"
-        raise ScenarioError(path, [f"variant = {', '.join(unknown)}: there is no such variant; {there_are}"])
-    ordered = tuple(name for name in known_variants if name in variants)
+    forms, known_variants = forms_and_variants(document)
+    chosen, ordered = _choose(path, document, form, variants)
     layers = [Layer("base", path, (), document)]
-    if not flown:
-        layers += _changes(contents, chosen, known_forms, ordered)
+    if "flown" not in document:
+        layers += _changes(contents, chosen, forms, ordered)
     merged = {key: value for key, value in document.items() if key not in ("form", "variant")}
     for layer in layers[1:]:
         merged = _merged(merged, layer.content)
-    for setting in settings:
-        merged = _set(path, merged, setting)
-        layers.append(Layer(f"--set {setting}", None, (), _nested(setting)))
-    for option, value in (("seed", seed), ("duration", duration)):
-        if value is not None:
-            merged[option] = value
-            layers.append(Layer(f"--{option}", None, (), {option: value}))
-    places = Places(contents, layers)
+    merged, options = _with_options(path, merged, settings, seed, duration)
+    places = Places(contents, [*layers, *options])
     plan = validate(Plan, merged, path, places)
-    inheriting = {name: block["claims_of"] for name, block in known_variants.items() if "claims_of" in block}
-    if inheriting and plan.flown is None:
-        for name, case in inheriting.items():
-            try:
-                inherited = _inherited(merged.get("claims", []), name, case, known_forms, list(known_variants))
-            except ValueError as error:
-                raise _error(path, [str(error)], places) from None
-            merged["claims"] = inherited
-        plan = validate(Plan, merged, path, places)
-    name = path.stem
     if plan.flown is not None:
-        name, ordered = plan.flown.name, tuple(plan.flown.variants)
-        settings = (*plan.flown.settings, *settings)
+        flown, settings = plan.flown, (*plan.flown.settings, *settings)
+        name, ordered = flown.name, tuple(flown.variants)
     else:
-        problems = _cases_of_none(plan, known_forms, list(known_variants))
-        if problems:
-            raise _error(path, problems, places)
+        name = path.stem
+        try:
+            plan = _with_inherited_claims(plan, merged, path, places, forms, known_variants)
+        except ValueError as error:
+            raise located_error(path, [str(error)], places) from None
+        if problems := _cases_of_none(plan, forms, list(known_variants)):
+            raise located_error(path, problems, places)
     return Scenario(
         name, path, chosen, ordered, tuple(settings), plan, merged, document, files=contents.files, places=places
     )
 
 
-def _error(file: Path, problems: Sequence[str], places: Places | None) -> ScenarioError:
-    return ScenarioError(file, problems, [places.located(one) for one in problems] if places else None)
+def _choose(
+    path: Path, document: dict[str, Any], form: str | None, variants: Sequence[str]
+) -> tuple[str, tuple[str, ...]]:
+    """The form and the variants to fly, these in the file's order."""
+    forms, known = forms_and_variants(document)
+    if "flown" in document and (variants or form not in (None, forms[0])):
+        raise ScenarioError(
+            path,
+            [f"is the scenario of a flight in form {forms[0]}: choose forms and variants from the original file"],
+        )
+    chosen = form or forms[0]
+    if chosen not in forms:
+        raise ScenarioError(path, [f"form = {chosen!r}: there is no such form; there are {', '.join(forms)}"])
+    unknown = [name for name in variants if name not in known]
+    if unknown:
+        there_are = f"there are {', '.join(known)}" if known else "the file has none"
+        raise ScenarioError(path, [f"variant = {', '.join(unknown)}: there is no such variant; {there_are}"])
+    return chosen, tuple(name for name in known if name in variants)
+
+
+def _with_options(
+    path: Path, document: dict[str, Any], settings: Sequence[str], seed: int | None, duration: float | None
+) -> tuple[dict[str, Any], list[Layer]]:
+    """``document`` with what the command line sets, and where each of these values came from."""
+    layers = []
+    for setting in settings:
+        document = _set(path, document, setting)
+        layers.append(Layer(f"--set {setting}", None, (), _nested(setting)))
+    for option, value in (("seed", seed), ("duration", duration)):
+        if value is not None:
+            document = document | {option: value}
+            layers.append(Layer(f"--{option}", None, (), {option: value}))
+    return document, layers
+
+
+def _with_inherited_claims(
+    plan: Plan,
+    merged: dict[str, Any],
+    path: Path,
+    places: Places,
+    forms: Sequence[str],
+    variants: dict[str, dict[str, Any]],
+) -> Plan:
+    """``plan`` with the claims of variants that have those of another case (``claims_of``), in ``merged`` too.
+
+    Raises
+    ------
+    ValueError
+        If there is no such case.
+    """
+    inheriting = {name: block["claims_of"] for name, block in variants.items() if "claims_of" in block}
+    if not inheriting:
+        return plan
+    for name, case in inheriting.items():
+        merged["claims"] = _inherited(merged.get("claims", []), name, case, forms, list(variants))
+    return validate(Plan, merged, path, places)
 
 
 def load_airframe(
@@ -159,7 +183,9 @@ def load_airframe(
     path = sheets.get(name_or_path, scenario_file.parent / name_or_path)
     if not path.is_file():
         there_are = f"there are {', '.join(sheets)}, or give a TOML file"
-        raise _error(scenario_file, [f"airframe = {name_or_path!r}: there is no such sheet; {there_are}"], places)
+        raise located_error(
+            scenario_file, [f"airframe = {name_or_path!r}: there is no such sheet; {there_are}"], places
+        )
     document = read(path)
     if "kd" in document:
         return validate(PointMassSheet, document, path)
@@ -170,7 +196,7 @@ def _require_tables(path: Path, document: dict[str, Any]) -> None:
     for key in ("form", "variant"):
         blocks = document.get(key, {})
         if not isinstance(blocks, dict) or not all(isinstance(block, dict) for block in blocks.values()):
-            raise ScenarioError(path, [f"{key} = {_shown(blocks)}: must be tables, [{key}.NAME]"])
+            raise ScenarioError(path, [f"{key} = {shortened(blocks)}: must be tables, [{key}.NAME]"])
 
 
 def _changes(contents: Contents, form: str, forms: Sequence[str], variants: Sequence[str]) -> Iterator[Layer]:
@@ -276,77 +302,3 @@ def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
         return {**inner, rest[0]: changed(inner.get(rest[0]), rest[1:])}
 
     return changed(document, parts)  # type: ignore[no-any-return]
-
-
-def validate(model: type[M], document: dict[str, Any], file: Path, places: Places | None = None) -> M:
-    """``document`` as ``model``, or all that is wrong with it."""
-    try:
-        return model.model_validate(document)
-    except ValidationError as error:
-        problems = [_problem(model, document, one) for one in error.errors(include_url=False)]
-        raise _error(file, list(dict.fromkeys(problems)), places) from None
-
-
-def _problem(model: type[BaseModel], document: Any, error: Any) -> str:
-    """One finding of pydantic as a sentence for the author of the file."""
-    parts: list[str] = []
-    node = document
-    for part in error["loc"]:
-        # Beside keys and indices, pydantic's location names the branches of unions, which stand in no file.
-        if isinstance(node, dict) and str(part) in node:
-            node = node[str(part)]
-        elif isinstance(node, list) and isinstance(part, int) and part < len(node):
-            node = node[part]
-        elif error["type"] == "missing":
-            node = {}
-        else:
-            continue
-        parts.append(str(part))
-    where = ".".join(parts) or "the file"
-    if error["type"] == "missing":
-        return f"{where}: is missing{_meaning(model, parts)}"
-    if error["type"] == "extra_forbidden":
-        owners = _models_at(model, parts[:-1])
-        allowed = [name for owner in owners for name in fields_of(owner)]
-        return f"{where} = {_shown(node)}: there is no such field here; allowed are {', '.join(dict.fromkeys(allowed))}"
-    text = error["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-    return f"{where} = {_shown(node)}: {text}{_meaning(model, parts)}"
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-def _models_in(annotation: Any) -> Iterable[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inner in typing.get_args(annotation):
-        yield from _models_in(inner)
-
-
-def _models_at(model: type[BaseModel], parts: Sequence[str]) -> list[type[BaseModel]]:
-    """The models that describe what stands at a path."""
-    current = [model]
-    for part in parts:
-        found: list[type[BaseModel]] = []
-        for one in current:
-            for name, field in one.model_fields.items():
-                if part in (name, field.alias):
-                    found += _models_in(field.annotation)
-        current = found or current
-    return current
-
-
-def _meaning(model: type[BaseModel], parts: Sequence[str]) -> str:
-    """Unit and meaning of a field, in brackets."""
-    for owner in _models_at(model, parts[:-1]) if parts else []:
-        for name, field in owner.model_fields.items():
-            if parts[-1] in (name, field.alias) and field.description:
-                return f" ({field.description})"
-    return ""
-
-
-def whole(value: float, tolerance: float = 1e-6) -> bool:
-    """Whether a positive number is whole but for rounding."""
-    return math.isfinite(value) and abs(value - round(value)) <= tolerance * max(1.0, abs(value))
