@@ -15,6 +15,8 @@ _FIRST, _END = 20000, 32768
 _LAST = 65535
 _PER_UAV = 6
 _SHARED = 4
+_STRIDE = 100
+"""Blocks begin at multiples of it, unless they are given."""
 
 
 class PortError(OSError):
@@ -97,19 +99,19 @@ def _in_use(base: int, size: int) -> int | None:
     """A port of the block that is in use, beside the guard's own."""
     from ftcc.link.mavlink import LOOPBACK  # listing running swarms needs no MAVLink
 
-    for port in range(base, base + size):
-        for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
-            if (port, kind) == (base, socket.SOCK_STREAM):
-                continue
-            with socket.socket(socket.AF_INET, kind) as probe:
-                if kind == socket.SOCK_STREAM:
-                    probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                try:
-                    probe.bind((LOOPBACK, port))
-                except OSError as error:
-                    if refused := _refused(error, port):
-                        raise refused from None
-                    return port
+    ports = range(base, base + size)
+    # Guards first: a port of a block that another swarm holds, but does not use yet, must not be bound even to try it.
+    tcp = sorted(ports[1:], key=lambda port: (port % _STRIDE != 0, port))
+    for kind, port in (*((socket.SOCK_STREAM, port) for port in tcp), *((socket.SOCK_DGRAM, port) for port in ports)):
+        with socket.socket(socket.AF_INET, kind) as probe:
+            if kind == socket.SOCK_STREAM:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((LOOPBACK, port))
+            except OSError as error:
+                if refused := _refused(error, port):
+                    raise refused from None
+                return port
     return None
 
 
@@ -141,7 +143,7 @@ def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
     if base is not None and not 0 < base <= _LAST - size + 1:
         raise PortError(f"port {base}: the block of {size} ports must begin from 1 to {_LAST - size + 1}")
     _require_loopback()
-    stride = -(-size // 100) * 100
+    stride = -(-size // _STRIDE) * _STRIDE
     candidates = [base] if base is not None else range(_FIRST, _END - size, stride)
     for candidate in candidates:
         block = PortBlock(candidate, tuple(uavs))

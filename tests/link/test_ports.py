@@ -114,6 +114,28 @@ def test_a_given_block_that_another_swarm_holds_is_refused(blocks):
         reserve(UAVS, block.base)
 
 
+def test_a_block_that_is_held_but_not_used_yet_is_not_even_tried(blocks, monkeypatch):
+    """Its swarm could find a port in use at the very moment at which another one tries it."""
+    first, second = (held(blocks, range(1, 9)) for _ in range(2))
+    assert second.base == first.base + 100
+    first.release()
+    tried = []
+
+    class Spy(socket.socket):
+        def bind(self, address):
+            tried.append((self.type, address[1]))
+            super().bind(address)
+
+    monkeypatch.setattr(socket, "socket", Spy)
+    large = held(blocks, range(1, 41))
+    assert large.base > second.base
+    assert not [port for kind, port in tried if kind == socket.SOCK_DGRAM and port in all_ports(second)]
+    assert [port for kind, port in tried if kind == socket.SOCK_STREAM and port in all_ports(second)] in (
+        [],
+        [second.base],
+    )
+
+
 def test_a_given_free_block_is_taken_as_it_is(blocks):
     free = reserve(UAVS)
     free.release()

@@ -112,7 +112,7 @@ def test_another_speed_than_the_missions_is_refused_where_followers_do_not_hear_
     ("settings", "words"),
     [
         (["leaders.5.over_obstacles=[580.0]"], "leaders.5.over_obstacles: 1 altitudes for 2 obstacles"),
-        (["leaders.5.commands=[{x=10.0, altitude=510.0}]"], "leaders.5: takes either over_obstacles or commands"),
+        (["leaders.5.commands=[{x=10.0, altitude=510.0}]"], "leaders.5: give either over_obstacles or commands"),
         (["leaders.5.V=25.0"], "must fly at the same speed"),
         (["obstacles.0.x=[4500.0, 2500.0]"], "obstacles.0"),
         (["detection_range=0.0"], "detection_range = 0.0"),

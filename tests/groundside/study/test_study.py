@@ -176,7 +176,7 @@ def test_a_process_that_dies_and_an_exception_are_rows(tmp_path: Path, monkeypat
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     # Plain Python there, and nothing to prepare here: nothing need be compiled.
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    monkeypatch.setattr(flights, "fly", lambda mission: None)
+    monkeypatch.setattr(flights, "fly_in_memory", lambda mission: None)
     forget_schemes()
     try:
         study = plan_study(EXAMPLE / "consensus.toml", ["gains.k_c=1,2,3,4"], settings=["scheme=deadly"], duration=0.1)
@@ -241,7 +241,7 @@ def test_without_semaphores_all_fly_in_this_process_with_a_warning(
 
     monkeypatch.setattr(flights.multiprocessing, "get_context", lambda _: Context())
     outcomes: list[Outcome] = []
-    with pytest.warns(RuntimeWarning, match=rf"{getattr(error, 'strerror', None) or error}.*fly in this one"):
+    with pytest.warns(RuntimeWarning, match=rf"{getattr(error, 'strerror', None) or error}.*run in this one"):
         assert fly_all(plan_study(scenario, seeds=2), 2, outcomes.append)
     assert [outcome.problem for outcome in outcomes] == ["", ""]
 
