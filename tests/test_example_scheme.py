@@ -20,6 +20,8 @@ from ftcc.groundside.simulation import PlainPython, simulate
 from tests.sitl.conftest import same_flight
 from tests.support.guests import EXAMPLE, forget_schemes, install
 
+pytestmark = pytest.mark.slow
+
 SCENARIO = EXAMPLE / "consensus.toml"
 SECONDS = 3.0
 

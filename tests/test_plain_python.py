@@ -11,6 +11,8 @@ import pytest
 
 from tests.support.plain_python import CASES, digest
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 1.0
 
 # The first start compiles every law.

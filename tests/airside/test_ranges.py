@@ -14,6 +14,8 @@ from ftcc.groundside import ScenarioError, load, resolve
 from ftcc.groundside.simulation import fly_in_memory
 from ftcc.sim.plant import DIVERGED, LOST, NUMBER
 
+pytestmark = pytest.mark.slow
+
 CASES = [(scheme, form) for scheme in names() for form in find(scheme).forms]
 NOT_A_NUMBER = {LOST[NUMBER], LOST[DIVERGED]}
 

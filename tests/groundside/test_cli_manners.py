@@ -155,6 +155,7 @@ def on_a_terminal(arguments: list[str], **environment: str) -> str:
     return said.decode()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="terminals end otherwise elsewhere")
 def test_colours_are_left_out_where_they_are_not_wanted(demo_run: Run) -> None:
     for command in (["report", str(demo_run.path), "--no-page"], ["check", "nowhere"]):
@@ -171,6 +172,7 @@ def test_progress_has_no_colours_either(tmp_path: Path) -> None:
     assert not COLOUR.search(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [80, 60])
 @pytest.mark.parametrize(
     "command",

@@ -220,6 +220,7 @@ def test_each_law_demands_its_own_graph():
     assert "nothing that UAV 1 sends reaches UAV 3" in warned.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_flight_in_plain_python_has_the_same_bits(law):
     """Four aircraft with loss and noise for the first tenth of a second, law and equations of motion."""

@@ -18,6 +18,8 @@ from ftcc.groundside.simulation import fly_in_memory
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case
 from tests.groundside.conftest import failing
 
+pytestmark = pytest.mark.slow
+
 SYNCHRONIZED = ("monograph", "flight", "flight+bare", "flight+bare+off", "flight+loss_30", "monograph+traditional")
 DIRECTED = ("flight", "flight+fresh", "monograph", "flight+cut_uav1_20s", "flight+undirected+delay_20")
 

@@ -12,6 +12,8 @@ from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.simulation import fly_in_memory
 from tests.groundside.conftest import failing, mission_of
 
+pytestmark = pytest.mark.slow
+
 PRINTED = ("monograph", "monograph+off")
 SAMPLED = ("flight+P", "flight+P+off", "flight", "flight+off")
 LOSSY = ("flight+P+loss30", "flight+loss30")

@@ -14,6 +14,8 @@ from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case
 from tests.groundside.conftest import failing
 
+pytestmark = pytest.mark.slow
+
 SCENARIO = "finite_time_containment"
 FLOWN = (
     "flight",

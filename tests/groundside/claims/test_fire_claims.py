@@ -15,6 +15,8 @@ from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.sim.plants import conditions_of
 from tests.groundside.conftest import failing, mission_of
 
+pytestmark = pytest.mark.slow
+
 ON_PLANT_A = "monograph+hz100"
 FLOWN = (
     "monograph",

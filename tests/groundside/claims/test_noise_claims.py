@@ -7,6 +7,8 @@ import pytest
 
 from ftcc.groundside.study import fly_all, plan_study
 
+pytestmark = pytest.mark.slow
+
 TRACKING = "altitude tracking with noise, factor 1"
 SEEDS = 40
 

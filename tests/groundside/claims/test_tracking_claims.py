@@ -13,6 +13,8 @@ from ftcc.groundside.claims.claims import Result
 from ftcc.groundside.simulation.cases import claims_in_flight, load_case
 from tests.groundside.conftest import failing
 
+pytestmark = pytest.mark.slow
+
 PRESCRIBED = (
     "monograph",
     "flight",

@@ -30,6 +30,7 @@ def refusal(name: str, *settings: str, form: str = "flight") -> str:
     return str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("duration", ["0.05", "1e-4"])
 @pytest.mark.parametrize("name", ["nearest_neighbour", "containment", "finite_time_containment", "fire_monitoring"])
 def test_flights_shorter_than_the_grid_of_the_checks_are_flown(name: str, duration: str) -> None:

@@ -31,6 +31,7 @@ def test_settings_come_after_variants_and_variants_after_the_form() -> None:
     assert (plan.gains.common["k11"], plan.faults[1].at, plan.scheme) == (5.0, 240.5, "other")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scheme", "gains", "adapted"),
     [
