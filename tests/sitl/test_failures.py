@@ -30,7 +30,8 @@ def last_time(folder: Path, uav: int) -> float:
 SLOW = ["--set", "rates={control_rate=50.0, exchange_rate=10.0, latency=0.1}", "--set", "record_rate=50"]
 
 
-@pytest.mark.parametrize("clock", [["--speed", "max"], ["--speed", "1", *SLOW]], ids=["lockstep", "real time"])
+# In lockstep not as fast as possible: on a busy machine the flight would be over before the test can kill anybody.
+@pytest.mark.parametrize("clock", [["--speed", "2"], ["--speed", "1", *SLOW]], ids=["lockstep", "real time"])
 @pytest.mark.parametrize("kind", ["autopilot", "vehicle"])
 def test_a_killed_process_is_named_and_the_others_fly_on(
     fly: Callable[..., Flight], clock: list[str], kind: str
@@ -38,7 +39,7 @@ def test_a_killed_process_is_named_and_the_others_fly_on(
     flight = fly("containment", *clock, "--duration", "12")
     flight.wait_until_flying()
     flight.child(f"uav3-{kind}").kill()
-    assert flight.wait() == 1
+    assert flight.wait() == 1, flight.output
     assert f"process uav3-{kind} died (killed by signal 9)" in flight.output
     assert any("died" in str(event.get("text")) for event in events(flight.folder))
     for uav in (1, 2, 4, 5, 6, 7, 8):
