@@ -11,12 +11,11 @@ import pytest
 
 from tests.support.plain_python import CASES, digest
 
-pytestmark = pytest.mark.slow
 
 SECONDS = 1.0
 
 # The first start compiles every law.
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")
