@@ -11,7 +11,6 @@ import pytest
 
 from tests.support.plain_python import CASES, digest
 
-
 SECONDS = 1.0
 
 # The first start compiles every law.
