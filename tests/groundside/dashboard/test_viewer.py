@@ -126,9 +126,10 @@ def test_a_viewer_that_dies_or_hangs_does_not_delay_the_swarm(watched: tuple[Das
     times, _ = rows(path, "/plots/motion/z/uavs", "Scalars:scalars")
     assert len(times) == 201
     if harm == signal.SIGKILL:
-        assert [problem.text for problem in problems] == [
-            "the viewer ended (exit code -9); the flight and its recording go on"
-        ]
+        texts = [problem.text for problem in problems]
+        assert texts[-1] == "the viewer ended (exit code -9); the flight and its recording go on"
+        # On a busy machine it may have fallen behind before.
+        assert set(texts[:-1]) <= {"the viewer does not keep up: not everything is shown"}
         assert any("the viewer ended" in text[0] for text in rows(path, "/events", "TextLog:text")[1])
 
 
