@@ -23,7 +23,6 @@ __all__ = [
     "Exchange",
     "Header",
     "Transmission",
-    "TransmissionError",
     "append",
     "begin",
     "deliver_due",
@@ -43,10 +42,6 @@ _HISTORY = 64
 """Records kept of each sender."""
 
 _NEXT = Edge._fields.index("next_sequence")
-
-
-class TransmissionError(ValueError):
-    """Not a valid transmission of this version."""
 
 
 class Exchange(NamedTuple):

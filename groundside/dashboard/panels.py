@@ -109,11 +109,7 @@ def _motion(subject: Subject) -> list[Panel]:
     panels = []
     for name in _MOTION[subject.family]:
         meaning, unit = _MEANINGS[name]
-        references = [
-            r
-            for r in (f"{name}_r", f"{name}_ref", f"{name}_d", f"{name}hat", f"{name}_hat", f"{name}_id")
-            if r in names
-        ]
+        references = [r for suffix in _REFERENCES if (r := f"{name}{suffix}") in names]
         band = name == "z" and subject.family == "containment"
         obstacles = name == "z" and bool(subject.obstacles)
         notes = [

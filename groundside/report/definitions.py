@@ -13,17 +13,14 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from ftcc.groundside.claims import check_expression
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.schema import Id, Strict
 from ftcc.link.actuators import unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of", "unknown_columns"]
+__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of"]
 
 _FOLDER = Path(__file__).parent / "figures"
 
@@ -166,17 +163,3 @@ def plain_sheet(mission: Mission) -> Sheet:
     ]
     figures.append(Figure(name="commands", title="Commands", panels=commands))
     return Sheet(figures=figures)
-
-
-def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
-    """Return the errors in a sheet's expressions, given the columns of a recording."""
-    wrong = []
-    for figure in sheet.figures:
-        expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]
-        expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true, p.reference) if e is not None]
-        for expression in dict.fromkeys(expressions):
-            try:
-                check_expression(expression, ["t", *columns])
-            except ValueError as error:
-                wrong.append(f"figure {figure.name}: {error}")
-    return wrong

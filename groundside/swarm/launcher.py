@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.dashboard import Event
 from ftcc.groundside.swarm.flow import Flow
+from ftcc.groundside.swarm.preloading import PLANT_VARIABLE, SCHEME_VARIABLE
 from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, Lost, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
@@ -40,8 +41,6 @@ _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
 """Exit codes that are normal after a stop, also for SIGTERM to the process group or a fork server that ended first."""
 _TAIL_LINES = 12
 """Lines of a dead process's log that are reported."""
-_SCHEME_VARIABLE, _PLANT_VARIABLE = "FTCC_PRELOAD_SCHEME", "FTCC_PRELOAD_PLANT"
-"""Environment variables that tell the fork server what to load, see `preload`."""
 
 
 def automatic_pack(uavs: int) -> int:
@@ -177,8 +176,8 @@ class Swarm:
         from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        os.environ[_SCHEME_VARIABLE] = self.mission.scheme.name
-        os.environ[_PLANT_VARIABLE] = self.mission.plant
+        os.environ[SCHEME_VARIABLE] = self.mission.scheme.name
+        os.environ[PLANT_VARIABLE] = self.mission.plant
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["ftcc.groundside.swarm.preload"])
         vehicles = {spec.uav: spec for spec in self.mission.vehicles}

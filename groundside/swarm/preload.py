@@ -24,6 +24,7 @@ from ftcc.airside import process as autopilot_process
 from ftcc.airside.compiled_stages import flight_of as flight_of_autopilots
 from ftcc.airside.compiled_stages import placeholder as no_autopilot
 from ftcc.airside.group import build_group as build_autopilots
+from ftcc.groundside.swarm.preloading import PLANT_VARIABLE, SCHEME_VARIABLE
 from ftcc.link.exchange import begin, take_in
 from ftcc.link.recording import LINK_COLUMNS, PartWriter, new_rows
 from ftcc.link.timing import Timing
@@ -32,13 +33,7 @@ from ftcc.sim.group import build_group as build_vehicles
 from ftcc.sim.plants import flight_of as flight_of_vehicles
 from ftcc.sim.spec import placeholder as no_vehicle
 
-__all__ = ["PLANT_VARIABLE", "SCHEME_VARIABLE", "load"]
-
-SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
-"""Environment variable that names the scheme to load."""
-
-PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
-"""Environment variable that names the plant to load."""
+__all__ = ["load"]
 
 
 def load(scheme: str, plant: str) -> None:

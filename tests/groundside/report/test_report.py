@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,10 +14,11 @@ import pytest
 from pydantic import ValidationError
 
 from ftcc.airside import schemes
+from ftcc.groundside.claims import check_expression
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.report.comparison import Comparison, labels_of
 from ftcc.groundside.report.curves import Flown
-from ftcc.groundside.report.definitions import Panel, Sheet, plain_sheet, read_sheet, sheet_of, unknown_columns
+from ftcc.groundside.report.definitions import Panel, Sheet, plain_sheet, read_sheet, sheet_of
 from ftcc.groundside.report.drawing import draw
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.report.report import write_report
@@ -27,6 +28,20 @@ from ftcc.groundside.scenario.mission import Mission, resolve
 from ftcc.groundside.simulation import fly_in_memory, simulate
 
 SHEETS = sorted((Path(__file__).parents[3] / "groundside" / "report" / "figures").glob("*.toml"))
+
+
+def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
+    """Return the errors in a sheet's expressions, given the columns of a recording."""
+    wrong = []
+    for figure in sheet.figures:
+        expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]
+        expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true, p.reference) if e is not None]
+        for expression in dict.fromkeys(expressions):
+            try:
+                check_expression(expression, ["t", *columns])
+            except ValueError as error:
+                wrong.append(f"figure {figure.name}: {error}")
+    return wrong
 
 
 @pytest.fixture(scope="module")

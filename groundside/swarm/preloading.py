@@ -1,0 +1,11 @@
+"""The environment variables by which the launcher tells the fork server what `preload` shall load.
+
+They stand apart from both: whoever imports `preload` loads all that flies, and the fork server nothing of the launcher.
+"""
+
+from __future__ import annotations
+
+__all__ = ["PLANT_VARIABLE", "SCHEME_VARIABLE"]
+
+SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
+PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
