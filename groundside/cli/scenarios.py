@@ -86,6 +86,7 @@ def check(
     if form is None and not variant and first.plan.flown is None:
         cases |= {case: load_case(scenario, case, settings or []) for case in cases_of(first) if case != first.case}
     out = terminal()
+    assert first.places is not None
     for file, held in first.places.files().items():
         out.print(f"{file.name}: {held}", markup=False, highlight=False, soft_wrap=not out.is_terminal)
     warned: dict[str, list[str]] = {}
@@ -110,6 +111,7 @@ def check(
 def _show_origin(scenario: Scenario, key: str) -> None:
     """Print the values at ``key``, each with the file, line and block that gave it last."""
     out = terminal()
+    assert scenario.places is not None
     places = scenario.places.of(key)
     if not places:
         value = _at(scenario.plan.model_dump(by_alias=True), key)

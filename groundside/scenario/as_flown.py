@@ -33,7 +33,7 @@ def as_flown(scenario: Scenario, scheme: Scheme) -> str:
 
     A default that changes in a later version does not change this flight.
     """
-    document = {key: value for key, value in scenario.document.items() if key != "flown"}
+    document = {key: value for key, value in scenario.document.items() if key not in ("flown", "study")}
     document["seed"] = scenario.plan.seed
     gains = document.get("gains", {})
     document["gains"] = gains | _all_gains(scenario, scheme)

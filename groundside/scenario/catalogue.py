@@ -1,7 +1,7 @@
 """Which scenarios there are, and what their files say: finding and reading them, without what checks or flies them.
 
-A scenario is the file ``NAME.toml``. Where ``NAME.variants.toml`` or ``NAME.claims.toml`` stand beside it, they are
-read with it, as if what they hold stood at its end.
+A scenario is the file ``NAME.toml``. Where ``NAME.variants.toml``, ``NAME.claims.toml`` or ``NAME.study.toml`` stand
+beside it, they are read with it, as if what they hold stood at its end.
 
 ``ftcc list`` shows what this module tells; it is imported in a few milliseconds, where pydantic and numba would take
 most of a second.
@@ -36,8 +36,8 @@ __all__ = [
 ]
 
 _HERE = Path(__file__).parents[1]
-_COMPANIONS = {"variants": ("variant", "order"), "claims": ("claims", "table")}
-"""What may stand in ``NAME.variants.toml`` and in ``NAME.claims.toml``."""
+_COMPANIONS = {"variants": ("variant", "order"), "claims": ("claims", "table"), "study": ("study",)}
+"""What may stand in ``NAME.variants.toml``, ``NAME.claims.toml`` and ``NAME.study.toml``."""
 
 
 class ScenarioError(UserError):
@@ -76,7 +76,7 @@ def shipped(kind: str = "scenarios") -> dict[str, Path]:
 
 
 def _belongs_to(path: Path) -> Path | None:
-    """The scenario whose variants or claims a file of that name holds."""
+    """The scenario whose variants, claims or study a file of that name holds."""
     stem, _, kind = path.stem.rpartition(".")
     return path.with_name(f"{stem}.toml") if stem and kind in _COMPANIONS else None
 
@@ -125,6 +125,7 @@ def _contents(texts: tuple[tuple[Path, str], ...]) -> Contents:
     variant_files: dict[str, Path] = {}
     claims: list[Any] = []
     origins: list[Origin] = []
+    study: dict[str, Any] = {}
     for file, content, part in parts:
         _check_keys(path, file, content, part)
         for name, block in _dict(file, content, part, "variant").items():
@@ -146,7 +147,11 @@ def _contents(texts: tuple[tuple[Path, str], ...]) -> Contents:
                 raise _refused(file, content, place, f"table.{n}.{error}") from None
         if order := part.get("order"):
             variants = _ordered(file, content, variants, order)
-    document = {key: value for key, value in document.items() if key != "table"}
+        if "study" in part and file != path:
+            if "study" in document:
+                raise _refused(file, content, ("study",), f"study: stands in {path.name} already")
+            study = {"study": part["study"]}
+    document = {key: value for key, value in document.items() if key != "table"} | study
     document |= ({"variant": variants} if variants else {}) | ({"claims": claims} if claims else {})
     return Contents(document, tuple(file for file, _, _ in parts), tuple(origins), variant_files)
 

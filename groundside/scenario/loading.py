@@ -9,7 +9,7 @@ line. Tables are merged, everything else is replaced.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from ftcc.groundside.scenario.places import Layer, Places
 from ftcc.groundside.scenario.validation import located_error, shortened, validate
 from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 
-__all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "shipped"]
+__all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "scenario_of", "shipped", "with_value"]
 
 _VARIANT_KEYS = ("title", "forms", "claims_of")
 
@@ -47,7 +47,8 @@ class Scenario:
     source: dict[str, Any]
     """The whole file, with all its forms, variants and claims, and those of the files beside it."""
     files: tuple[Path, ...]
-    places: Places
+    places: Places | None
+    """None where it was read from no file."""
 
     @property
     def case(self) -> str:
@@ -67,6 +68,7 @@ def load(
     settings: Sequence[str] = (),
     seed: int | None = None,
     duration: float | None = None,
+    changes: Mapping[str, Any] | None = None,
 ) -> Scenario:
     """Read a scenario and choose its form and variants.
 
@@ -81,6 +83,8 @@ def load(
         ``key.path=value``, the value as in TOML; a number in the path counts the entries of a list from 0.
     seed, duration
         Override the file's.
+    changes : mapping, optional
+        What a study changes: merged after the variants, before the settings.
 
     Raises
     ------
@@ -95,6 +99,8 @@ def load(
     layers = [Layer("base", path, (), document)]
     if "flown" not in document:
         layers += _changes(contents, chosen, forms, ordered)
+    if changes:
+        layers.append(Layer("changes of the study", None, (), dict(changes)))
     merged = {key: value for key, value in document.items() if key not in ("form", "variant")}
     for layer in layers[1:]:
         merged = _merged(merged, layer.content)
@@ -115,6 +121,19 @@ def load(
     return Scenario(
         name, path, chosen, ordered, tuple(settings), plan, merged, document, files=contents.files, places=places
     )
+
+
+def scenario_of(
+    document: dict[str, Any], file: Path, *, name: str, form: str, variants: Sequence[str] = ()
+) -> Scenario:
+    """Return the scenario of a merged document; airframes that are files lie beside ``file``, which need not exist.
+
+    Raises
+    ------
+    ScenarioError
+    """
+    plan = validate(Plan, document, file)
+    return Scenario(name, file, form, tuple(variants), (), plan, document, document, files=(), places=None)
 
 
 def _choose(
@@ -288,14 +307,28 @@ def _set(path: Path, document: dict[str, Any], setting: str) -> dict[str, Any]:
     parts, value = _key_and_value(setting)
     if "=" not in setting or not all(parts):
         raise ScenarioError(path, [f"--set {setting}: must be key.path=value, such as channel.loss=0.3"])
+    try:
+        return with_value(document, parts, value)
+    except LookupError as error:
+        raise ScenarioError(path, [f"--set {setting}: {error.args[0]}"]) from None
 
-    def changed(node: Any, rest: list[str]) -> Any:
+
+def with_value(document: dict[str, Any], parts: Sequence[str], value: Any) -> dict[str, Any]:
+    """Return ``document`` with another value at a path of keys, and of numbers in lists.
+
+    Raises
+    ------
+    LookupError
+        If a list has no such entry.
+    """
+
+    def changed(node: Any, rest: Sequence[str]) -> Any:
         if not rest:
             return value
         if isinstance(node, list):
             if not rest[0].isdecimal() or int(rest[0]) >= len(node):
                 entries = f"{'.'.join(parts)} has {len(node)} entries, counted from 0"
-                raise ScenarioError(path, [f"--set {setting}: {entries}; {rest[0]} is none of them"])
+                raise LookupError(f"{entries}; {rest[0]} is none of them")
             index = int(rest[0])
             return [*node[:index], changed(node[index], rest[1:]), *node[index + 1 :]]
         inner = node if isinstance(node, dict) else {}

@@ -81,6 +81,8 @@ class Places:
                 words.append(_counted(variants, "variant"))
             if claims:
                 words.append(f"{_counted(len(claims), 'claim')} of {_counted(len(cases), 'case')}")
+            if file.name.endswith(".study.toml"):
+                words.append(f"a study of {_counted(len(document['study'].get('random', {})), 'random quantity')}")
             held[file] = "; ".join(words)
         return held
 
@@ -110,7 +112,7 @@ class Places:
     def _place(self, layer: Layer, parts: tuple[str, ...]) -> Place:
         file, path = layer.file, (*layer.path, *parts)
         if layer.file == self._contents.files[0] and not layer.path:
-            # What stands in no form and no variant; the claims and variants may stand in files beside it.
+            # What stands in no form and no variant; claims, variants and study may stand in files beside it.
             if parts[0] == "claims":
                 if len(parts) == 1:
                     file, path = self._contents.claims[0].file, self._contents.claims[0].path[:1]
@@ -119,6 +121,8 @@ class Places:
                     file, path = origin.file, (*origin.path, *parts[2:])
             elif parts[0] == "variant" and len(parts) > 1:
                 file = self._contents.variants[parts[1]]
+            elif parts[0] == "study":
+                file = next((one for one in self._contents.files if one.name.endswith(".study.toml")), file)
         line = line_of(text_of(file), path) if file else None
         return Place(layer.name, file, line, ".".join(path[len(layer.path) :]))
 

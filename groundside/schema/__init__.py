@@ -8,6 +8,7 @@ from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
 from ftcc.groundside.schema.plan import Claim, Plan, Rates, fields_of
 from ftcc.groundside.schema.references import LeaderFields
+from ftcc.groundside.schema.study import StudyClaim, StudyFields
 from ftcc.groundside.schema.wind import TurbulenceFields
 from ftcc.groundside.schema.world import FaultFields
 
@@ -27,6 +28,8 @@ __all__ = [
     "Rates",
     "Start",
     "Strict",
+    "StudyClaim",
+    "StudyFields",
     "TurbulenceFields",
     "fields_of",
     "record_of",

@@ -11,6 +11,7 @@ from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.fire import FireEventFields, FireFields
 from ftcc.groundside.schema.network import ChannelFields, GraphFields, LinkEventFields
 from ftcc.groundside.schema.references import AttitudeFields, LeaderFields
+from ftcc.groundside.schema.study import StudyFields
 from ftcc.groundside.schema.wind import GustFields, TurbulenceFields, WindFields
 from ftcc.groundside.schema.world import DisturbanceFields, FaultFields, HomeFields, NoiseFields, ObstacleFields
 
@@ -130,6 +131,7 @@ class Plan(Strict):
     noise: NoiseFields = NoiseFields()
     home: HomeFields = HomeFields()
     claims: list[Claim] = []
+    study: StudyFields | None = Field(None, description="for `ftcc study` alone; flights do not depend on it")
     flown: Flown | None = None
 
 
