@@ -23,6 +23,7 @@ LABELS = {
     "verdict": "how it went",
     "scenario": "files to specs",
     "claims": "what must hold",
+    "statistics": "draws, intervals",
     "schema": "fields, ranges",
     "airside": "laws, autopilot",
     "sim": "aircraft, vehicle",
