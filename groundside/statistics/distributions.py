@@ -96,7 +96,7 @@ class Distribution:
                 raise DistributionError(f"{value!r} is none of {self.text}")
             (n,) = places
             return float(0.5 * ((ends[n - 1] if n else 0.0) + ends[n]))
-        if not _is_number(value) or not math.isfinite(value):
+        if not _is_number(value) or not _is_finite(value):
             raise DistributionError(f"{value!r} is no value of {self.text}")
         law, arguments = self._scipy
         with np.errstate(all="ignore"):

@@ -180,7 +180,7 @@ def test_a_quantile_that_is_infinite_is_refused() -> None:
         distribution_of("norm()", "test").values([0.5, 0.0])
 
 
-@pytest.mark.parametrize("value", ["x", True, float("nan"), None])
+@pytest.mark.parametrize("value", ["x", True, float("nan"), None, 10**400])
 def test_a_value_that_is_no_number_has_no_place(value: Any) -> None:
     with pytest.raises(DistributionError, match="is no value of"):
         distribution_of("norm()", "test").place(value)
