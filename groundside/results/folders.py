@@ -12,7 +12,14 @@ from pathlib import Path
 
 from ftcc.groundside.errors import UserError
 
-__all__ = ["BusyFolderError", "NothingRecordedError", "RunError", "new_folder", "sole_writer"]
+__all__ = [
+    "BusyFolderError",
+    "NothingRecordedError",
+    "RunError",
+    "lock_until_exit",
+    "new_folder",
+    "sole_writer",
+]
 
 _locks: dict[tuple[int, int], int] = {}
 """Descriptors of the folders that this process locked until its exit, by (device, inode)."""
@@ -50,7 +57,13 @@ def sole_writer(folder: Path) -> Iterator[None]:
 
 
 def lock_until_exit(folder: Path) -> None:
-    """Lock an existing folder until this process ends in any way."""
+    """Lock an existing folder until this process ends in any way.
+
+    Raises
+    ------
+    BusyFolderError
+        If another process writes into it.
+    """
     status = folder.stat()
     place = status.st_dev, status.st_ino
     if place not in _locks:
@@ -71,7 +84,7 @@ def _lock(folder: Path) -> int:
     return descriptor
 
 
-_RESULT_FILES = ("scenario.toml", "study.parquet")
+_RESULT_FILES = ("scenario.toml", "study.toml", "study.parquet")
 """A folder with one of these files contains a run or a study."""
 
 

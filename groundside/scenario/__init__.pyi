@@ -12,3 +12,4 @@ from .loading import scenario_of as scenario_of
 from .loading import with_value as with_value
 from .mission import Mission as Mission
 from .mission import resolve as resolve
+from .validation import validate as validate

@@ -82,7 +82,7 @@ class Places:
             if claims:
                 words.append(f"{_counted(len(claims), 'claim')} of {_counted(len(cases), 'case')}")
             if file.name.endswith(".study.toml"):
-                words.append(f"a study of {_counted(len(document['study'].get('random', {})), 'random quantity')}")
+                words.append("a study")
             held[file] = "; ".join(words)
         return held
 

@@ -16,5 +16,6 @@ from .intervals import upper_bound as upper_bound
 from .sensitivity import Index as Index
 from .sensitivity import saltelli as saltelli
 from .sensitivity import sobol_indices_of as sobol_indices_of
+from .stopping import LOST as LOST
 from .stopping import Until as Until
 from .stopping import until_of as until_of
