@@ -28,6 +28,7 @@ from ftcc.groundside.scenario.loading import load, shipped
 from ftcc.groundside.scenario.mission import Mission, resolve
 from ftcc.groundside.simulation import fly_in_memory, simulate
 from ftcc.groundside.swarm.pace import usable_cores
+from tests.bench.flight_shares import flight_shares
 from tests.bench.flights import FTCC, Flight, fly
 from tests.bench.stages import LAW, stage_times
 from tests.bench.stubs import KINDS, StubResult, fly_stub
@@ -104,6 +105,11 @@ def stages(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
     runs = [stage_times(mission) for _ in range(repeats)]
     rows: list[Row] = [{"stage": name, "us": statistics.median(run[name] for run in runs)} for name in runs[0]]
     return [*rows, {"stage": "all", "us": statistics.median(sum(run.values()) for run in runs)}]
+
+
+def shares(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
+    """One flight of a study, of containment with 30 % loss, in memory: its parts, from loading to its verdict."""
+    return flight_shares(repeats)
 
 
 def in_one_process(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
@@ -276,6 +282,7 @@ def dashboard(repeats: int, swarms: Sequence[int], folder: Path) -> list[Row]:
 PARTS: dict[str, Callable[[int, Sequence[int], Path], list[Row]]] = {
     "laws": laws,
     "stages": stages,
+    "shares": shares,
     "simulate": in_one_process,
     "start": start_up,
     "fly": with_processes,

@@ -9,6 +9,7 @@ import pytest
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import fly_in_memory
+from tests.bench.flight_shares import stage_seconds
 from tests.bench.stubs import KINDS, fly_stub
 from tests.bench.swarms import swarm_file
 
@@ -43,3 +44,11 @@ def test_a_stub_understands_every_datagram(kind):
     result = fly_stub(kind, pairs=2, seconds=0.2)
     assert result.factor > 0.1
     assert result.pair_us > 0.0
+
+
+def test_a_flight_stage_by_stage_is_the_flight():
+    mission = resolve(load("containment", variants=["loss30"], duration=5.0))
+    _, world = stage_seconds(mission)
+    flight = fly_in_memory(mission)
+    for part in ("truth", "command", "acting", "conditions", "signals", "links"):
+        assert getattr(world.recording, part).tobytes() == getattr(flight, part).tobytes()
