@@ -9,7 +9,18 @@ from ftcc.link.actuators import ACTUATORS, THRUST
 from ftcc.link.compiled import compiled, compiled_within, copy, fields
 from ftcc.sim.faults import fault_in_force
 
-__all__ = ["NO_AUTOTHROTTLE", "Autothrottle", "actuate", "has_autothrottle", "hold_speed", "latch", "stroke"]
+__all__ = [
+    "IDLE",
+    "NO_AUTOTHROTTLE",
+    "Autothrottle",
+    "Drive",
+    "actuate",
+    "drive_of",
+    "has_autothrottle",
+    "hold_speed",
+    "latch",
+    "stroke",
+]
 
 
 class Autothrottle(NamedTuple):
@@ -24,6 +35,26 @@ class Autothrottle(NamedTuple):
 
 
 NO_AUTOTHROTTLE = Autothrottle(0.0, 0.0, 0.0)
+
+
+class Drive(NamedTuple):
+    """What moves an actuator in a step; the same in all steps in which its command and its faults are."""
+
+    effectiveness: float
+    bias: float
+    """In the unit of the actuator."""
+    rate: float
+    """Fastest motion, rad/s or N/s; inf = no limit."""
+    target: float
+    """The command within its limits, rad or N."""
+    half_decay: float
+    """Share of the way to the target that the lag leaves after half a step, 0..1,"""
+    decay: float
+    """and after the whole step."""
+
+
+IDLE = Drive(1.0, 0.0, math.inf, 0.0, 1.0, 1.0)
+"""Of an actuator that the plant does not have."""
 
 _GAIN = Autothrottle._fields.index("gain")
 
@@ -89,11 +120,14 @@ def actuate(fleet, i, time):
 
 
 @compiled
-def _moved(before, target, lag, rate, since):
-    """Position ``since`` s after ``before`` on the way to ``target``: pos' = lag (target - pos), at most ``rate``."""
+def _moved(before, target, lag, rate, since, decay):
+    """Position ``since`` s after ``before`` on the way to ``target``: pos' = lag (target - pos), at most ``rate``.
+
+    ``decay`` is exp(-lag since).
+    """
     away = abs(target - before)
     if lag * away <= rate and lag > 0.0:
-        return target + (before - target) * math.exp(-lag * since)
+        return target + (before - target) * decay
     slowing = rate / lag if lag > 0.0 else 0.0
     until = (away - slowing) / rate
     direction = 1.0 if target > before else -1.0
@@ -114,13 +148,21 @@ def _swung(before, speed, target, frequency, damping, since):
 
 
 @compiled
-def stroke(fleet, i, actuator, time, step):
+def drive_of(fleet, i, actuator, time, step):
+    """The `Drive` of an actuator in a ``step`` (s) whose middle, at which a fault is taken, is at ``time`` (s)."""
+    effectiveness, bias, rate = fault_in_force(fleet, i, actuator, time)
+    lag = fleet.lag[i, actuator]
+    target = _saturated(fleet, i, actuator)
+    return Drive(effectiveness, bias, rate, target, math.exp(-lag * (0.5 * step)), math.exp(-lag * step))
+
+
+@compiled
+def stroke(fleet, i, actuator, drive, step):
     """Acting deflection at the beginning, middle and end of a ``step`` (s), with lag and rate limit integrated exactly.
 
-    A fault is taken at ``time`` (s), the middle of the step.
+    ``drive`` is that of `drive_of`.
     """
-    effectiveness, bias, rate = fault_in_force(fleet, i, actuator, time)
-    target = _saturated(fleet, i, actuator)
+    effectiveness, bias, rate, target = drive.effectiveness, drive.bias, drive.rate, drive.target
     before = fleet.position[i, actuator]
     if _immediate(fleet, i, actuator, rate):
         fleet.position[i, actuator] = target
@@ -136,8 +178,8 @@ def stroke(fleet, i, actuator, time, step):
         middle, _ = _swung(before, speed, target, lag, damping, 0.5 * step)
         after, fleet.speed[i, actuator] = _swung(before, speed, target, lag, damping, step)
     else:
-        middle = _moved(before, target, lag, rate, 0.5 * step)
-        after = _moved(before, target, lag, rate, step)
+        middle = _moved(before, target, lag, rate, 0.5 * step, drive.half_decay)
+        after = _moved(before, target, lag, rate, step, drive.decay)
     fleet.position[i, actuator] = after
     fleet.deflection[i, actuator] = effectiveness * after + bias
     return effectiveness * before + bias, effectiveness * middle + bias, fleet.deflection[i, actuator]

@@ -12,10 +12,10 @@ from typing import Any
 from ftcc.link.actuators import SLOT, encode_command
 from ftcc.link.compiled import compiled, compiled_apart, compiled_within, fields, fill, moved
 from ftcc.link.messages import PositionTarget
+from ftcc.sim.actuation import IDLE, drive_of, has_autothrottle, hold_speed, stroke
 from ftcc.sim.actuation import actuate as plant_actuate
-from ftcc.sim.actuation import has_autothrottle, hold_speed, stroke
-from ftcc.sim.disturbances import disturb, gust
-from ftcc.sim.faults import fault_in_force
+from ftcc.sim.disturbances import disturb, disturbances_are_steady, gust
+from ftcc.sim.faults import fault_in_force, faults_are_steady
 from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z
@@ -59,9 +59,16 @@ def actuate(fleet, i, time):
 
 
 @compiled_within
-def _stroke(fleet, i, slot, time, step):
+def _drive(fleet, i, slot, time, step):
     if slot in _SLOTS:  # known when compiled
-        return stroke(fleet, i, slot, time, step)
+        return drive_of(fleet, i, slot, time, step)
+    return IDLE
+
+
+@compiled_within
+def _stroke(fleet, i, slot, drives, step):
+    if slot in _SLOTS:  # known when compiled
+        return stroke(fleet, i, slot, drives[slot], step)
     return 0.0, 0.0, 0.0
 
 
@@ -91,19 +98,35 @@ def _disturb(fleet, i, time, out):
 
 
 @compiled
-def _step(fleet, i, parameters, time, h):
-    """One step of RK4 of ``h`` (s) whose middle is at ``time`` (s)."""
+def _drives(fleet, i, time, h):
+    """What moves each actuator in a step of ``h`` (s) whose middle is at ``time`` (s)."""
     _set_autothrottle(fleet, i)
-    a0, a1, a2 = _stroke(fleet, i, 0, time, h)
-    b0, b1, b2 = _stroke(fleet, i, 1, time, h)
-    c0, c1, c2 = _stroke(fleet, i, 2, time, h)
-    d0, d1, d2 = _stroke(fleet, i, 3, time, h)
-    begin, middle, end = _Inputs(a0, b0, c0, d0), _Inputs(a1, b1, c1, d1), _Inputs(a2, b2, c2, d2)
+    return (
+        _drive(fleet, i, 0, time, h),
+        _drive(fleet, i, 1, time, h),
+        _drive(fleet, i, 2, time, h),
+        _drive(fleet, i, 3, time, h),
+    )
+
+
+@compiled
+def _disturbances(fleet, i, time):
+    """The disturbances of a step whose middle is at ``time`` (s)."""
     disturbed = fleet.disturbed[i]
     _disturb(fleet, i, time, disturbed)
     if _GUST >= 0 and fleet.gust_deviation[i] > 0.0:
         disturbed[_GUST] += _gusts(fleet, i, time)
-    d = fields(_Disturbances, disturbed)
+    return fields(_Disturbances, disturbed)
+
+
+@compiled
+def _step(fleet, i, parameters, drives, d, h):
+    """One step of RK4 of ``h`` (s) under the disturbances ``d``."""
+    a0, a1, a2 = _stroke(fleet, i, 0, drives, h)
+    b0, b1, b2 = _stroke(fleet, i, 1, drives, h)
+    c0, c1, c2 = _stroke(fleet, i, 2, drives, h)
+    d0, d1, d2 = _stroke(fleet, i, 3, drives, h)
+    begin, middle, end = _Inputs(a0, b0, c0, d0), _Inputs(a1, b1, c1, d1), _Inputs(a2, b2, c2, d2)
     x = fleet.state[i]
     s = fields(_State, x)
     r1 = _rates(s, begin, d, parameters)
@@ -118,6 +141,8 @@ def _step(fleet, i, parameters, time, h):
 def advance(fleet, i, start_us, period_us, step_us):
     """Fly vehicle ``i`` for one period from ``start_us`` (us) with the command in force, in steps of ``step_us``.
 
+    What is the same in all steps of the period is computed in the first one.
+
     Returns
     -------
     int
@@ -128,8 +153,17 @@ def advance(fleet, i, start_us, period_us, step_us):
     guards = fields(Guards, fleet.guards[i])
     parameters = fields(_Parameters, fleet.airframe[i])
     h = step_us / 1e6
+    begin, end = start_us / 1e6, (start_us + period_us) / 1e6
+    same_drives = not has_autothrottle(fleet, i) and faults_are_steady(fleet, i, begin, end)
+    calm = fleet.still[i] == 1 and fleet.gust_deviation[i] == 0.0
+    same_disturbances = calm and disturbances_are_steady(fleet, i, begin, end)
     for n in range(period_us // step_us):
-        _step(fleet, i, parameters, (start_us + n * step_us + step_us // 2) / 1e6, h)
+        time = (start_us + n * step_us + step_us // 2) / 1e6
+        if n == 0 or not same_drives:
+            drives = _drives(fleet, i, time, h)
+        if n == 0 or not same_disturbances:
+            d = _disturbances(fleet, i, time)
+        _step(fleet, i, parameters, drives, d, h)
         if _MOVES and fleet.still[i] == 0:
             _blow(fleet, i, start_us // step_us + n + 1)
         why = _lost(fields(_State, fleet.state[i]), guards)

@@ -9,7 +9,7 @@ from ftcc.link.compiled import compiled, fields, fill
 from ftcc.link.philox import GUST, gaussian_pair, philox
 from ftcc.sim.faults import onset
 
-__all__ = ["CALM", "Disturbance", "Gust", "disturb", "gust"]
+__all__ = ["CALM", "Disturbance", "Gust", "disturb", "disturbances_are_steady", "gust"]
 
 
 class Disturbance(NamedTuple):
@@ -55,6 +55,18 @@ def disturb(fleet, i, time, out):
         if since >= 0.0 and time < one.until:
             swing = math.sin(one.frequency * since + one.phase) if one.frequency > 0.0 else 1.0
             out[int(one.channel)] += one.value * onset(since, one.onset) * swing
+
+
+@compiled
+def disturbances_are_steady(fleet, i, begin, end):
+    """Whether `disturb` writes the same from ``begin`` to ``end`` (s): none begins, grows, oscillates or ends."""
+    for n in range(fleet.disturbances.shape[1]):
+        one = fields(Disturbance, fleet.disturbances[i, n])
+        if one.time > end or one.until <= begin:
+            continue
+        if one.time > begin or one.until <= end or one.frequency > 0.0 or onset(begin - one.time, one.onset) < 1.0:
+            return False
+    return True
 
 
 @compiled

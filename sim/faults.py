@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 from ftcc.link.compiled import compiled, compiled_within, fields
 
-__all__ = ["INTERMITTENT", "STUCK", "WRONG", "Fault", "fault_in_force", "healthy", "onset"]
+__all__ = ["INTERMITTENT", "STUCK", "WRONG", "Fault", "fault_in_force", "faults_are_steady", "healthy", "onset"]
 
 _ROUNDING = 1e-9
 """By how much a time may be short of the phase that it belongs to, s."""
+
+_COMPLETE = 40.0
+"""exp(-40) is lost beside 1: from there on an onset is complete, to the last bit."""
 
 WRONG, STUCK, INTERMITTENT = range(3)
 """Kinds of `Fault`."""
@@ -49,7 +52,7 @@ _TIME, _ACTUATOR = Fault._fields.index("time"), Fault._fields.index("actuator")
 @compiled_within
 def onset(since, rate):
     """Share, 0..1, of its full size that a fault or disturbance has ``since`` s after it began; ``rate`` in 1/s."""
-    return 1.0 if rate == 0.0 else 1.0 - math.exp(-rate * since)
+    return 1.0 if rate == 0.0 or rate * since > _COMPLETE else 1.0 - math.exp(-rate * since)
 
 
 @compiled_within
@@ -81,3 +84,21 @@ def fault_in_force(fleet, i, actuator, time):
     effectiveness = 1.0 + (fault.effectiveness - 1.0) * onset(since, fault.effectiveness_onset)
     bias = fault.bias * onset(since, fault.bias_onset)
     return effectiveness, bias, min(fleet.rate[i, actuator], fault.slew)
+
+
+@compiled
+def faults_are_steady(fleet, i, begin, end):
+    """Whether `fault_in_force` is the same from ``begin`` to ``end`` (s) for every actuator of vehicle ``i``.
+
+    That is, no fault begins, grows, or comes and goes.
+    """
+    for n in range(fleet.fault_count[i]):
+        fault = fields(Fault, fleet.faults[i, n])
+        if fault.time > end:
+            continue
+        if fault.time > begin or int(fault.kind) == INTERMITTENT:
+            return False
+        since = begin - fault.time
+        if onset(since, fault.effectiveness_onset) < 1.0 or onset(since, fault.bias_onset) < 1.0:
+            return False
+    return True

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ftcc.link.actuators import SLOT, THRUST
-from ftcc.sim.actuation import latch, stroke
+from ftcc.sim.actuation import drive_of, latch, stroke
 from ftcc.sim.build import build_fleet
 from ftcc.sim.disturbances import Disturbance, Gust, gust
 from ftcc.sim.faults import Fault
@@ -116,7 +116,7 @@ def test_a_second_order_actuator_follows_its_transfer_function():
         lambda t, x: [x[1], 64.0 * (1.5 - x[0]) - 11.2 * x[1]], (0.0, 0.4), [1.0, 0.0], rtol=1e-11, atol=1e-12
     ).y[:, -1]
     for _ in range(40):
-        begin, middle, end = stroke(fleet, 0, LOAD, 0.2, 0.01)
+        begin, middle, end = stroke(fleet, 0, LOAD, drive_of(fleet, 0, LOAD, 0.2, 0.01), 0.01)
     assert (fleet.position[0, LOAD], fleet.speed[0, LOAD]) == pytest.approx(exact, abs=1e-8)
     assert end == pytest.approx(0.5 * exact[0] + 0.1)
     assert begin < middle < end
