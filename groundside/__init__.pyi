@@ -1,3 +1,5 @@
+from .claims import Result as Result
+from .results import MissingPackageError as MissingPackageError
 from .results import Run as Run
 from .results import RunError as RunError
 from .results import export as export
@@ -7,7 +9,9 @@ from .scenario import ScenarioError as ScenarioError
 from .scenario import load as load
 from .scenario import resolve as resolve
 from .simulation import Flight as Flight
+from .simulation import ScenarioWarning as ScenarioWarning
 from .simulation import fly_in_memory as fly_in_memory
+from .simulation import fly_to_disk as fly_to_disk
 from .simulation import simulate as simulate
 from .swarm import Station as Station
 from .swarm import StationError as StationError

@@ -138,11 +138,10 @@ def load_scenario(
     duration: float | None = None,
 ) -> Scenario:
     """The scenario that the options ask for."""
-    variants = [one.strip() for one in variant.split(",") if one.strip()]
     with _loading():
         from ftcc.groundside.scenario import load
 
-        return load(name, form=form, variants=variants, settings=settings or [], seed=seed, duration=duration)
+        return load(name, form=form, variants=variant, settings=settings or [], seed=seed, duration=duration)
 
 
 def load_mission(
@@ -177,7 +176,7 @@ def show_claims(folder: Path) -> None:
     from ftcc.groundside.results import Run, RunError
 
     try:
-        results = report.claims_of(Run(folder))
+        results = Run(folder).claims()
     except RunError as error:
         # A flight that ended before anything was recorded has said why already.
         warn(str(error))

@@ -25,14 +25,14 @@ def report(
 ) -> None:
     """Show the verdict and the claims of a run, and write a page with its figures; exit code 1 if a claim fails."""
     from ftcc.groundside.claims import failed
-    from ftcc.groundside.report import as_json, claims_of, show, write_report
+    from ftcc.groundside.report import as_json, show, write_report
     from ftcc.groundside.results import NothingRecordedError, Run, RunError, export
 
     recorded = Run(run)
     exports = {"csv": csv, "mat": mat, "kml": kml, "gpx": gpx, "ulog": ulog}
     written = terminal(stderr=True)
     try:
-        results = claims_of(recorded)
+        results = recorded.claims()
     except NothingRecordedError as error:
         if json or any(exports.values()):
             raise

@@ -151,8 +151,6 @@ def simulate(
     """Fly a scenario in one process, as fast as possible, and record it."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from ftcc.groundside.claims import evaluate
-    from ftcc.groundside.results import RunError
     from ftcc.groundside.simulation import simulate as simulate_mission
 
     mission = load_mission(scenario, form, variant, settings, seed, duration)
@@ -172,13 +170,9 @@ def simulate(
 
         try:
             run = simulate_mission(mission, folder, lambda t: progress.update(task, completed=t), ready)
-        except OSError as error:
-            raise RunError(
-                f"{folder}: cannot be written: {error.strerror or error}; free some space, or give --out"
-            ) from None
         finally:
             compiling.cancel()
-    show_summary(folder, evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration))
+    show_summary(folder, run.claims())
     judged(run.verdict, strict)
     if run.lost or run.verdict.flown < mission.timing.duration:
         raise typer.Exit(1)

@@ -1,7 +1,6 @@
 from .comparison import Comparison as Comparison
 from .report import write_report as write_report
 from .terminal import as_json as as_json
-from .terminal import claims_of as claims_of
 from .terminal import claims_table as claims_table
 from .terminal import show as show
 from .terminal import show_claims as show_claims

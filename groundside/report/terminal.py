@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ftcc.groundside.claims import Result, evaluate
+from ftcc.groundside.claims import Result
 from ftcc.groundside.results import Run
 from ftcc.groundside.text import ids
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict
@@ -15,16 +15,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-__all__ = ["as_json", "claims_of", "claims_table", "number", "show", "show_claims", "show_verdict", "summary"]
+__all__ = ["as_json", "claims_table", "number", "show", "show_claims", "show_verdict", "summary"]
 
 _COLOURS = {AS_IT_SHOULD: "bold green", REMARKS: "bold yellow", FAILED: "bold red"}
 _MARKS = {True: "[green]holds[/]", False: "[bold red]FAILS[/]", None: "[dim]not flown[/]"}
-
-
-def claims_of(run: Run) -> list[Result]:
-    """Evaluate the claims of a run's scenario on its recording."""
-    mission = run.mission
-    return evaluate(run, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
 def show_verdict(console: Console, verdict: Verdict) -> None:

@@ -4,6 +4,10 @@ from .folders import NothingRecordedError as NothingRecordedError
 from .folders import RunError as RunError
 from .folders import lock_until_exit as lock_until_exit
 from .folders import new_folder as new_folder
+from .folders import reserved_folder as reserved_folder
 from .folders import sole_writer as sole_writer
+from .recording import MissingPackageError as MissingPackageError
+from .recording import Recording as Recording
 from .run import Run as Run
 from .table import TableWriter as TableWriter
+from .table import arrow_table as arrow_table

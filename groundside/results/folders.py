@@ -18,6 +18,7 @@ __all__ = [
     "RunError",
     "lock_until_exit",
     "new_folder",
+    "reserved_folder",
     "sole_writer",
 ]
 
@@ -123,6 +124,26 @@ def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> 
     if found:
         raise RunError(f"--out {folder}: already holds {found[0]}; give a folder that is empty or does not exist")
     return folder
+
+
+@contextlib.contextmanager
+def reserved_folder(out: str | Path) -> Iterator[Path]:
+    """A `new_folder` that is locked within the ``with`` block only, unless this process had locked it before.
+
+    Raises
+    ------
+    RunError, BusyFolderError
+        As `new_folder`.
+    """
+    before = set(_locks)
+    folder = new_folder("", out)
+    try:
+        yield folder
+    finally:
+        status = folder.stat()
+        place = status.st_dev, status.st_ino
+        if place not in before:
+            os.close(_locks.pop(place))
 
 
 def _first_free(stem: Path) -> Path:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ftcc.groundside.results.column_reader import ColumnReader
 from ftcc.groundside.results.folders import RunError
 from ftcc.groundside.results.merging import merge_run, up_to_date_table
+from ftcc.groundside.results.recording import Recording
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Run"]
 
 
-class Run:
+class Run(Recording):
     """A recorded flight; for a flight in progress, its state at the first access.
 
     Parameters
@@ -51,7 +52,7 @@ class Run:
         return load(self.path / "scenario.toml")
 
     @functools.cached_property
-    def mission(self) -> Mission:
+    def mission(self) -> Mission:  # type: ignore[override]
         """The scenario resolved: graph, scheme, timing, claims."""
         from ftcc.groundside.scenario import resolve
 
@@ -108,6 +109,10 @@ class Run:
         The whole table is in memory; for a long flight, read one `column` after the other.
         """
         return self._columns.read_all()
+
+    def to_arrow(self) -> Any:
+        """All columns as a ``pyarrow.Table``: `signals`."""
+        return self.signals
 
     @property
     def columns(self) -> dict[str, Column]:

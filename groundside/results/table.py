@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftcc.groundside.scenario import LEADING
 from ftcc.link.recording import Column, arrow_schema
 
-__all__ = ["TableWriter"]
+__all__ = ["TableWriter", "arrow_table"]
 
 
 def _ordered(columns: Sequence[Column]) -> list[Column]:
@@ -21,6 +21,22 @@ def _ordered(columns: Sequence[Column]) -> list[Column]:
     first = [unique[name] for name in LEADING if name in unique]
     rest = [column for column in dict.fromkeys(unique[c.name] for c in columns) if column.name not in LEADING]
     return first + rest
+
+
+def arrow_table(columns: Sequence[Column], values: Mapping[str, NDArray[Any]]) -> Any:
+    """Return a ``pyarrow.Table`` as `TableWriter` writes it: units in the fields' metadata, the leading columns first.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        Repetitions are allowed.
+    values : mapping
+        An array by column name, one entry per tick and UAV.
+    """
+    import pyarrow as pa
+
+    ordered = _ordered(columns)
+    return pa.Table.from_arrays([pa.array(values[column.name]) for column in ordered], schema=arrow_schema(ordered))
 
 
 class TableWriter:
@@ -36,21 +52,17 @@ class TableWriter:
     """
 
     def __init__(self, path: Path, columns: Sequence[Column], as_of: int | None = None) -> None:
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        self._pa = pa
         self._path, self._as_of = path, as_of
         self._unfinished = path.with_suffix(f".{os.getpid()}")
         self._columns = _ordered(columns)
-        self._schema = arrow_schema(self._columns)
         options = {"use_dictionary": False, "compression": "lz4", "write_statistics": ["t", "uav"]}
-        self._file = pq.ParquetWriter(self._unfinished, self._schema, **options)
+        self._file = pq.ParquetWriter(self._unfinished, arrow_schema(self._columns), **options)
 
     def write(self, values: Mapping[str, NDArray[Any]]) -> None:
         """Append rows: an array by column name, one entry per tick and UAV."""
-        arrays = [self._pa.array(values[column.name]) for column in self._columns]
-        self._file.write_table(self._pa.Table.from_arrays(arrays, schema=self._schema))
+        self._file.write_table(arrow_table(self._columns, values))
 
     def __enter__(self) -> TableWriter:
         return self

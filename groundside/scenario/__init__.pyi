@@ -12,4 +12,6 @@ from .loading import scenario_of as scenario_of
 from .loading import with_value as with_value
 from .mission import Mission as Mission
 from .mission import resolve as resolve
+from .settings import Settings as Settings
+from .settings import setting_texts as setting_texts
 from .validation import validate as validate

@@ -24,6 +24,7 @@ from ftcc.groundside.scenario.catalogue import (
     shipped,
 )
 from ftcc.groundside.scenario.places import Layer, Places
+from ftcc.groundside.scenario.settings import Settings, setting_texts
 from ftcc.groundside.scenario.validation import located_error, shortened, validate
 from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 
@@ -64,8 +65,8 @@ def load(
     name_or_path: str | Path,
     *,
     form: str | None = None,
-    variants: Sequence[str] = (),
-    settings: Sequence[str] = (),
+    variants: str | Sequence[str] = (),
+    settings: Settings = (),
     seed: int | None = None,
     duration: float | None = None,
     changes: Mapping[str, Any] | None = None,
@@ -78,9 +79,10 @@ def load(
         A shipped scenario's name, the path of a TOML file, or a run's folder (to fly it again).
     form : str, optional
         Default: the first form of the file.
-    variants : sequence of str
-    settings : sequence of str
-        ``key.path=value``, the value as in TOML; a number in the path counts the entries of a list from 0.
+    variants : sequence of str, or a text with commas between them
+    settings : mapping, or sequence of str
+        ``{"gains": {"k11": 3.0}}``, ``{"gains.k11": 3.0}`` or ``["gains.k11=3.0"]``, see `settings.setting_texts`;
+        a number in the path counts the entries of a list from 0.
     seed, duration
         Override the file's.
     changes : mapping, optional
@@ -91,6 +93,9 @@ def load(
     ScenarioError
     """
     path = find(name_or_path)
+    settings = setting_texts(settings, path)
+    if isinstance(variants, str):
+        variants = [one.strip() for one in variants.split(",") if one.strip()]
     contents = contents_of(path)
     document = contents.document
     _require_tables(path, document)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from ftcc.groundside.claims import Result, evaluate
-from ftcc.groundside.scenario import Scenario, forms_and_variants, load, resolve
+from ftcc.groundside.claims import Result
+from ftcc.groundside.scenario import Scenario, Settings, forms_and_variants, load, resolve
 from ftcc.groundside.simulation.flight import Flight
 from ftcc.groundside.simulation.one_process import fly_in_memory
 
@@ -18,7 +16,7 @@ def cases_of(scenario: Scenario) -> list[str]:
     return list(dict.fromkeys([*forms, *(case for claim in scenario.plan.claims for case in claim.expected)]))
 
 
-def load_case(name: str, case: str, settings: Sequence[str] = (), **options: float | None) -> Scenario:
+def load_case(name: str, case: str, settings: Settings = (), **options: float | None) -> Scenario:
     """Load a scenario in a case such as ``flight+P+off``; ``options`` are seed and duration, see `scenario.load`."""
     form, *variants = case.split("+")
     return load(name, form=form, variants=variants, settings=settings, **options)  # type: ignore[arg-type]
@@ -26,6 +24,5 @@ def load_case(name: str, case: str, settings: Sequence[str] = (), **options: flo
 
 def claims_in_flight(scenario: Scenario) -> tuple[Flight, list[Result]]:
     """Fly a scenario in memory; return the flight and the results of its case's claims."""
-    mission = resolve(scenario)
-    flight = fly_in_memory(mission)
-    return flight, evaluate(flight, mission.claims, mission.case, mission.graph, mission.timing.duration)
+    flight = fly_in_memory(resolve(scenario))
+    return flight, flight.claims()

@@ -9,19 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.groundside.results import Recording, arrow_table
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.verdict import Verdict, judge
 from ftcc.link.actuators import SLOT
 from ftcc.link.channel import LINK_REPORT
+from ftcc.link.recording import Column
 from ftcc.sim.obstacles import clearance, zones_of
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import conditions_of, find
 
-__all__ = ["Flight"]
+__all__ = ["Flight", "recorded_columns"]
+
+
+def recorded_columns(mission: Mission) -> tuple[Column, ...]:
+    """Return name, unit and meaning of the columns that a mission's processes record; names may repeat."""
+    # These imports are slow, and only a table needs them.
+    from ftcc.airside.process import columns as autopilot_columns
+    from ftcc.sim.process import columns as vehicle_columns
+
+    return (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Recording):
     """A flight, or a part of one, in memory, with the same columns as a `Run`."""
 
     mission: Mission
@@ -127,3 +138,7 @@ class Flight:
         for name, (values, n) in self._places.items():
             table[name] = values[:, order, n].ravel()[flown]
         return table
+
+    def to_arrow(self) -> Any:
+        """Return all columns as a ``pyarrow.Table``, as a run of the same flight has it."""
+        return arrow_table(recorded_columns(self.mission), self.table())

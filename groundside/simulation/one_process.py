@@ -1,6 +1,6 @@
 """A whole flight in one process: the same functions in the same order as between processes, and the same recording.
 
-`fly_in_memory` keeps the recording; `to_disk.simulate` writes it to disk part by part.
+`fly_in_memory` keeps the recording; `to_disk.fly_to_disk` writes it to disk part by part.
 """
 
 from __future__ import annotations

@@ -12,21 +12,21 @@ import psutil  # type: ignore[import-untyped]
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.groundside.results import Run, TableWriter
 from ftcc.groundside.scenario import Mission
-from ftcc.groundside.simulation.flight import Flight
+from ftcc.groundside.simulation.flight import Flight, recorded_columns
 from ftcc.groundside.simulation.one_process import Progress, defer_interrupt, fly_in_parts
 from ftcc.groundside.simulation.space import recording_size, require_space
 from ftcc.groundside.verdict import VERDICT_FILE, judge
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
 
-__all__ = ["simulate"]
+__all__ = ["fly_to_disk"]
 
 _BLOCK = 65536
-"""Rows of all UAVs that `simulate` keeps in memory before it writes them."""
+"""Rows of all UAVs that `fly_to_disk` keeps in memory before it writes them."""
 _LEAST_SHARE = 0.1
 """Least size on disk, as a share of the size in memory; only constant columns take less."""
 
 
-def simulate(
+def fly_to_disk(
     mission: Mission, folder: Path, progress: Progress | None = None, ready: Callable[[], None] | None = None
 ) -> Run:
     """Fly a mission in this process and record it in ``folder``, as the processes of a swarm would.
@@ -38,20 +38,15 @@ def simulate(
     OSError
         If it cannot be written, for example on a full disk.
     """
-    # These imports are slow, and only a recording needs them.
-    from ftcc.airside.process import columns as autopilot_columns
-    from ftcc.sim.process import columns as vehicle_columns
-
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     require_space(
         mission, _LEAST_SHARE * recording_size(mission)[1], psutil.disk_usage(str(folder)).free / 1e9, "disk at least"
     )
     timing = mission.timing
-    columns = (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
     last = 0.0
     with (
-        TableWriter(folder / "signals.parquet", columns) as signals,
+        TableWriter(folder / "signals.parquet", recorded_columns(mission)) as signals,
         TableWriter(folder / "links.parquet", LINK_COLUMNS) as links,
     ):
 

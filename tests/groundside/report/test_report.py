@@ -292,6 +292,6 @@ def test_runs_of_one_case_are_distinguished_by_their_folders(demo_run: Run) -> N
 
 
 def test_json_of_the_claims_holds_no_nan(demo_run: Run) -> None:
-    from ftcc.groundside.report import as_json, claims_of
+    from ftcc.groundside.report import as_json
 
-    assert json.loads(as_json(demo_run, claims_of(demo_run)))["claims"]
+    assert json.loads(as_json(demo_run, demo_run.claims()))["claims"]

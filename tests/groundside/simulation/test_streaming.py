@@ -42,7 +42,7 @@ def test_blocks_of_any_size_give_the_table_of_the_flight(
     flight = fly_in_memory(flown)
     assert flight.lost
     monkeypatch.setattr(to_disk, "_BLOCK", block)
-    recorded = to_disk.simulate(flown, tmp_path)
+    recorded = to_disk.fly_to_disk(flown, tmp_path)
     if block == 1:
         assert pq.read_metadata(tmp_path / "signals.parquet").num_row_groups == 1201
     for table, values in (
@@ -65,7 +65,7 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
 ) -> None:
     flown = of_a_loss()
     monkeypatch.setattr(to_disk, "_BLOCK", 8 * 250)
-    to_disk.simulate(flown, tmp_path)
+    to_disk.fly_to_disk(flown, tmp_path)
     flight = fly_in_memory(flown)
     monkeypatch.setattr(column_reader, "_MEMORY", memory)
     recorded = Run(tmp_path)
@@ -80,7 +80,7 @@ def test_columns_are_the_same_whatever_is_kept_of_them(
 def test_parts_are_joined_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.groundside.results.test_run import write_parts
 
-    whole = to_disk.simulate(of_a_loss(), tmp_path / "whole")
+    whole = to_disk.fly_to_disk(of_a_loss(), tmp_path / "whole")
 
     def keep(uav: int, role: str) -> int | None:
         return {(2, "autopilot"): 700, (3, "vehicle"): 500, (5, "vehicle"): 0}.get((uav, role))
@@ -104,7 +104,7 @@ def peak(tmp_path: Path, seconds: float) -> float:
         "to_disk._BLOCK = 8 * 500\n"
         "def ended(*_): print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)\n"
         "to_disk._conclude = ended\n"
-        "to_disk.simulate(resolve(load('containment', duration=float(sys.argv[1]))), sys.argv[2])\n"
+        "to_disk.fly_to_disk(resolve(load('containment', duration=float(sys.argv[1]))), sys.argv[2])\n"
     )
     command = [sys.executable, "-c", program, str(seconds), str(tmp_path / f"{seconds:g}")]
     return float(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
@@ -131,7 +131,7 @@ def test_ctrl_c_while_a_block_is_written_leaves_whole_blocks(tmp_path: Path, mon
     # As at a terminal: whoever started the tests may have had Ctrl-C ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        recorded = to_disk.simulate(mission(), tmp_path)
+        recorded = to_disk.fly_to_disk(mission(), tmp_path)
     finally:
         signal.signal(signal.SIGINT, before)
     rows = recorded.signals.num_rows
