@@ -1,0 +1,33 @@
+"""The studies that ship beside the scenarios: they can be planned, and most of what they draw can fly."""
+
+import pytest
+
+from ftcc.groundside.scenario import read, shipped
+from ftcc.groundside.studies.plan import plan_study
+
+STUDIED = (
+    "attitude_synchronization",
+    "containment",
+    "directed_attitude",
+    "finite_time_containment",
+    "fire_monitoring",
+    "nearest_neighbour",
+    "prescribed_performance",
+)
+DRAWS = 20
+
+
+def test_every_scheme_has_a_study() -> None:
+    assert tuple(sorted(name for name, file in shipped().items() if "study" in read(file))) == STUDIED
+
+
+@pytest.mark.parametrize("name", STUDIED)
+def test_a_shipped_study_asks_something_and_most_of_its_draws_can_fly(name: str) -> None:
+    plan = plan_study(name)
+    first = [plan.drawn(plan.trial(draw * len(plan.combinations))) for draw in range(DRAWS)]
+    assert plan.question.endswith("?")
+    assert len(plan.claims) >= 2
+    (on, _), (off, _) = plan.documents
+    assert set(off.split("+")) == {*on.split("+"), "off"}
+    assert len({values for values, _, _ in first}) == DRAWS
+    assert sum(mission is not None for _, mission, _ in first) >= DRAWS / 2
