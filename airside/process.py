@@ -214,7 +214,15 @@ class AutopilotProcess:
             self.group.attention[0] = now + _ATTENTION
             for link in self.gcs_links:
                 link.attend()
+            self.write_if_held()
             self.warn_if_stalled()
+
+    def write_if_held(self) -> None:
+        """Write what has been recorded when the swarm is held, for who looks now."""
+        if not self.gate.open(int(self.group.done.max()) + 1):
+            for recorder in (self.recorder, self.link_recorder):
+                if recorder.rows.filled.any():
+                    recorder.write()
 
     def warn_if_stalled(self) -> None:
         """Log what this process waits for, where it has waited for long."""

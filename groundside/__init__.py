@@ -1,8 +1,8 @@
 """What people touch; each room's `__init__.pyi` lists what the others use of it.
 
-`load` and `resolve` prepare a scenario for `simulate` (recorded) or `fly_in_memory`; `Run` opens a recorded flight and
-`export` writes it for other programs; `Station` commands a running swarm. Each is imported on its first use: a process
-of a swarm, or ``ftcc list``, must not pay for pydantic and Arrow.
+`simulate` flies a scenario in this process and `Swarm` with processes; `load` and `resolve` prepare one; `Run` opens a
+recorded flight and `export` writes it for other programs; `Station` commands a running swarm. Each is imported
+on its first use: a process of a swarm, or ``ftcc list``, must not pay for pydantic and Arrow.
 """
 
 import lazy_loader

@@ -6,12 +6,16 @@ from .results import export as export
 from .scenario import Mission as Mission
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
+from .scenario import ScenarioWarning as ScenarioWarning
 from .scenario import load as load
 from .scenario import resolve as resolve
 from .simulation import Flight as Flight
-from .simulation import ScenarioWarning as ScenarioWarning
 from .simulation import fly_in_memory as fly_in_memory
 from .simulation import fly_to_disk as fly_to_disk
 from .simulation import simulate as simulate
+from .swarm import NoAnswerError as NoAnswerError
+from .swarm import RefusedError as RefusedError
 from .swarm import Station as Station
 from .swarm import StationError as StationError
+from .swarm import Swarm as Swarm
+from .swarm import SwarmError as SwarmError

@@ -195,9 +195,13 @@ class Gate:
         """Whether the swarm may pass this tick."""
         return self.limit is None or tick <= self.limit
 
+    def is_held(self, tick: int) -> bool:
+        """Whether this process has reported that it is held before a tick."""
+        return self._held == tick
+
     def hold(self, tick: int) -> None:
         """Report, once, that the limit holds this process before a tick."""
-        if self._held != tick:
+        if not self.is_held(tick):
             self._held = tick
             self.report(Held(tick))
 

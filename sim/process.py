@@ -167,7 +167,9 @@ class Vehicles:
         self.group.attention[0] = time.monotonic() + _ATTENTION
 
     def hold(self) -> None:
-        """Report to the launcher, once, that this process is held."""
+        """Report to the launcher, once, that this process is held; write what it has recorded, for who looks now."""
+        if not self.gate.is_held(self.tick):
+            self.recorder.write()
         self.gate.hold(self.tick)
         self.stall.progress()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +36,6 @@ __all__ = [
     "scenario_names",
     "show_claims",
     "show_summary",
-    "speed_factor",
     "terminal",
     "warn",
 ]
@@ -74,7 +72,6 @@ Strict = Annotated[bool, typer.Option("--strict", help="Exit with code 3 if the 
 
 _FAILED = 3
 """Exit code of ``--strict``."""
-_GREATEST_SPEED = 1000.0
 _PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables must not be folded into a file."""
 
@@ -102,17 +99,6 @@ def fail(text: str) -> NoReturn:
     """Bad input: one message, exit code 2."""
     _say(f"ftcc: {text}", "bold red")
     sys.exit(2)
-
-
-def speed_factor(text: str, name: str) -> float:
-    """Simulated seconds per second from the option or argument ``name``; inf for "max"."""
-    try:
-        factor = math.inf if text == "max" else float(text)
-    except ValueError:
-        factor = math.nan
-    if not (text == "max" or 0.0 < factor < _GREATEST_SPEED):
-        fail(f"{name} {text}: must be a positive factor below {_GREATEST_SPEED:g}, or 'max'")
-    return factor
 
 
 @contextlib.contextmanager

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast, get_args
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -20,85 +19,24 @@ from ftcc.groundside.cli.common import (
     Settings,
     Strict,
     Variants,
-    fail,
     judged,
     load_mission,
-    new_run_folder,
     scenario_names,
     show_claims,
-    speed_factor,
     terminal,
-    warn,
 )
 
 if TYPE_CHECKING:
     from ftcc.groundside.dashboard import Event, Pace
     from ftcc.groundside.scenario import Mission
-    from ftcc.groundside.swarm import FlightOptions, Outcome, Viewer
-    from ftcc.link.addresses import Address
+    from ftcc.groundside.swarm import FlightOptions, Outcome
     from ftcc.link.ports import PortBlock
 
 __all__ = ["fly"]
 
 _FLIGHT_FAILED = 1
-_LAST_SYSTEM = 239
-"""Greatest MAVLink system id of a UAV."""
 
 _COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
-
-
-def _pack(text: str, uavs: int) -> int:
-    from ftcc.groundside.swarm import automatic_pack
-
-    if text == "auto":
-        return automatic_pack(uavs)
-    if not text.isdecimal() or not 1 <= int(text) <= uavs:
-        fail(f"--pack {text}: must be 'auto' or a number of vehicles per process from 1 to {uavs}")
-    return int(text)
-
-
-def _listeners(given: list[str] | None) -> tuple[Address, ...]:
-    """Addresses of ground stations."""
-    from ftcc.link.gcs_sockets import LISTENERS
-
-    if given is None:
-        return LISTENERS
-    from ftcc.link.addresses import AddressError, resolve
-
-    found = []
-    for text in given:
-        if text == "none":
-            continue
-        try:
-            found.append(resolve(text))
-        except AddressError as error:
-            fail(f"--mavlink {text}: {error}")
-    return tuple(dict.fromkeys(found))
-
-
-def _check_key(key: Path | None, systems: Iterable[int]) -> None:
-    """That the key can be used, and what was heard with it read; a warning where nothing new can be kept."""
-    from ftcc.link.mavlink import AUTOPILOT
-    from ftcc.link.signing import KeyFileError, Signing, read_key, stamps_file
-
-    if key is None:
-        return
-    try:
-        secret = read_key(key)
-        memories = [Signing(secret, stamps_file(key, system, AUTOPILOT)) for system in systems]
-    except KeyFileError as error:
-        fail(f"--key {error}")
-    if not all(memory.can_remember() for memory in memories):
-        warn(
-            f"--key {key}: the time stamps of received messages cannot be saved beside it, "
-            "so commands of this flight could be replayed in the next one"
-        )
-
-
-def _check_systems(greatest: int, id_offset: int) -> None:
-    """Beyond them are the systems of ground stations."""
-    if not 0 <= id_offset <= _LAST_SYSTEM - greatest:
-        fail(f"--id-offset {id_offset}: must be from 0 to {_LAST_SYSTEM - greatest} with UAVs up to {greatest}")
 
 
 def fly(
@@ -140,56 +78,27 @@ def fly(
     strict: Strict = False,
 ) -> None:
     """Fly a swarm: a vehicle process and an autopilot process per UAV, with MAVLink, mesh and dashboard."""
+    from ftcc.groundside.swarm import check_choices, prepare_flight, speed_factor
+
     factor = speed_factor(speed, "--speed")
-    _check_choices(clock, factor, viewer)
+    check_choices(clock, factor, viewer)
     mission = load_mission(scenario, form, variant, settings, seed, duration)
-    if not mission.wire:
-        fail(f"form {mission.form!r} has ideal exchange and flies in one process only; use `ftcc simulate`")
-    count = _pack(pack, len(mission.vehicles))
-    listeners = _listeners(mavlink)
-    uavs = [spec.uav for spec in mission.vehicles]
-    _check_systems(max(uavs), id_offset)
-    _check_key(key, [uav + id_offset for uav in uavs])
-
-    from ftcc.groundside.swarm import FlightOptions, check_name, provide_files
-
-    provide_files(mission, count, len(listeners))
-    check_name(f"{mission.name}-20000101-000000-2" if out is None else out.name)
-    ports = _reserve(uavs, port)
-    options = FlightOptions(
-        folder=new_run_folder(mission, out),
-        lockstep=clock == "lockstep",
+    options, ports = prepare_flight(
+        mission,
+        out,
         speed=factor,
-        pack=count,
-        held=hold,
-        viewer=cast("Viewer", viewer),
+        clock=clock,
+        hold=hold,
+        viewer=viewer,
         open_browser=browser,
-        listeners=listeners,
+        pack=pack,
+        port=port,
+        mavlink=mavlink,
         key=key,
         id_offset=id_offset,
     )
     outcome, wall = _fly_on_the_terminal(mission, options, ports)
     _report(outcome, wall, mission, options.folder, strict)
-
-
-def _check_choices(clock: str, factor: float, viewer: str) -> None:
-    from ftcc.groundside.swarm import Clock, Viewer
-
-    if clock not in get_args(Clock):
-        fail(f"--clock {clock}: must be one of {', '.join(get_args(Clock))}")
-    if clock == "wall" and math.isinf(factor):
-        fail("--clock wall --speed max: the wall clock needs a factor; use --clock lockstep to fly as fast as possible")
-    if viewer not in get_args(Viewer):
-        fail(f"--viewer {viewer}: must be one of {', '.join(get_args(Viewer))}")
-
-
-def _reserve(uavs: list[int], port: int | None) -> PortBlock:
-    from ftcc.link.ports import PortError, reserve
-
-    try:
-        return reserve(uavs, port)
-    except PortError as error:
-        fail(str(error))
 
 
 def _fly_on_the_terminal(mission: Mission, options: FlightOptions, ports: PortBlock) -> tuple[Outcome, float]:

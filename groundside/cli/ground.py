@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ftcc.groundside.cli.common import fail, speed_factor, terminal, warn
+from ftcc.groundside.cli.common import fail, terminal, warn
 from ftcc.link.text import as_seconds
 
 if TYPE_CHECKING:
-    from ftcc.groundside.swarm import Station
+    from ftcc.groundside.swarm import Control, Station
 
 __all__ = [
     "attitude",
@@ -136,14 +135,10 @@ def fault(
     key: Key = None,
 ) -> None:
     """Inject a fault into an actuator or the navigation solution of a UAV."""
-    sizes: dict[str, float] = {}
-    if kind in ("wrong", "intermittent") and what not in ("position", "attitude"):
-        sizes |= {"effectiveness": 1.0 if effectiveness is None else effectiveness, "bias": bias or 0.0}
-        if effectiveness is None and bias is None:
-            fail(f"fault {what}: its size is missing; give --effectiveness, --bias or both")
-    if kind == "wrong" and what not in ("position", "attitude"):
-        sizes |= {"effectiveness_onset": onset or 0.0, "bias_onset": onset or 0.0}
-    sizes |= {name: value for name, value in (("slew", slew), ("period", period), ("duty", duty)) if value is not None}
+    from ftcc.groundside.swarm import sizes_of_fault
+
+    given = {"effectiveness": effectiveness, "bias": bias, "onset": onset, "slew": slew, "period": period, "duty": duty}
+    sizes = sizes_of_fault(what, kind, {name: value for name, value in given.items() if value is not None})
     for setting in size or []:
         name, _, text = setting.partition("=")
         try:
@@ -318,38 +313,35 @@ _HOLDING = 10.0
 """Wall time within which a swarm must be held, s."""
 
 
-def _tell(name: str | None, command: str, **arguments: float | None) -> None:
-    from ftcc.groundside.swarm import ask_swarm, find_swarm
+@contextmanager
+def _control(name: str | None) -> Iterator[Control]:
+    """The flow of time of a swarm; a refusal ends with exit code 1, a swarm that is not there with 2."""
+    from ftcc.groundside.swarm import Control, RefusedError, find_swarm
 
     try:
-        ask_swarm(find_swarm(name), command, **arguments)
+        yield Control(find_swarm(name))
     except LookupError as error:
         fail(str(error))
-    except (OSError, RuntimeError) as error:
+    except (OSError, RefusedError) as error:
         terminal(stderr=True).print(f"ftcc: {error}", style="bold red", markup=False, highlight=False)
         raise typer.Exit(_REFUSED) from None
 
 
-def _wait_until_held(name: str | None) -> None:
-    from ftcc.groundside.swarm import ask_swarm, find_swarm
+def _wait_until_held(control: Control) -> None:
+    from ftcc.groundside.swarm import RefusedError
 
-    until = time.monotonic() + _HOLDING
-    while time.monotonic() < until:
-        try:
-            status = ask_swarm(find_swarm(name), "status")
-        except (LookupError, OSError, RuntimeError) as error:
-            fail(f"the swarm ended before it could be paused ({error})")
-        if status["state"] == "held":
-            _say(f"paused at t = {as_seconds(round(status['t'] * 1e6))} s")
-            return
-        time.sleep(0.02)
-    fail(f"the swarm was not paused within {_HOLDING:g} s")
+    try:
+        t = control.wait_until_held(_HOLDING)
+    except (OSError, RefusedError) as error:
+        fail(f"the swarm ended before it could be paused ({error})")
+    _say(f"paused at t = {as_seconds(round(t * 1e6))} s")
 
 
 def pause(name: _Name = None) -> None:
     """Pause a running swarm, all vehicles at the same tick."""
-    _tell(name, "pause")
-    _wait_until_held(name)
+    with _control(name) as control:
+        control.pause()
+        _wait_until_held(control)
 
 
 def step(
@@ -357,13 +349,15 @@ def step(
     swarm: Swarm = None,
 ) -> None:
     """Fly a paused swarm for some ticks, then pause it again."""
-    _tell(swarm, "step", ticks=ticks)
-    _wait_until_held(swarm)
+    with _control(swarm) as control:
+        control.step(ticks)
+        _wait_until_held(control)
 
 
 def resume(name: _Name = None) -> None:
     """Resume a swarm that was paused, or started with --hold."""
-    _tell(name, "resume")
+    with _control(name) as control:
+        control.resume()
 
 
 def speed(
@@ -371,8 +365,11 @@ def speed(
     swarm: Swarm = None,
 ) -> None:
     """Change the speed of a running swarm."""
+    from ftcc.groundside.swarm import speed_factor
+
     wanted = speed_factor(factor, "speed")
-    _tell(swarm, "speed", factor=None if math.isinf(wanted) else wanted)
+    with _control(swarm) as control:
+        control.speed(wanted)
 
 
 # Keys.

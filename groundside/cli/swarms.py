@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from ftcc.groundside.cli.common import Variants, fail, load_mission, scenario_names, speed_factor, terminal
+from ftcc.groundside.cli.common import Variants, fail, load_mission, scenario_names, terminal
 
 if TYPE_CHECKING:
     from ftcc.groundside.swarm import Entry
@@ -56,27 +56,21 @@ def ps() -> None:
 _Name = Annotated[str | None, typer.Argument(help="Name of the swarm, see `ftcc ps`; needed if several are running.")]
 
 
-def _tell(name: str | None, command: str) -> None:
-    from ftcc.groundside.swarm import ask_swarm, find_swarm
-
-    try:
-        ask_swarm(find_swarm(name), command)
-    except LookupError as error:
-        fail(str(error))
-    except (OSError, RuntimeError) as error:
-        terminal().print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
-        raise typer.Exit(1) from error
-
-
 def stop(
     name: _Name = None, every: Annotated[bool, typer.Option("--all", help="Stop all running swarms.")] = False
 ) -> None:
     """Stop a running swarm; its results up to now are kept."""
-    from ftcc.groundside.swarm import running_swarms
+    from ftcc.groundside.swarm import Control, RefusedError, find_swarm, running_swarms
 
     names: list[str | None] = [entry.name for entry in running_swarms()] if every else [name]
     for one in names:
-        _tell(one, "stop")
+        try:
+            Control(find_swarm(one)).stop()
+        except LookupError as error:
+            fail(str(error))
+        except (OSError, RefusedError) as error:
+            terminal().print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
+            raise typer.Exit(1) from error
 
 
 def doctor(
@@ -87,7 +81,7 @@ def doctor(
     speed: Annotated[str, typer.Option(help="The speed that you want, in times real time, or 'max'.")] = "1",
 ) -> None:
     """Examine this computer, and fly a scenario for some seconds to measure how fast it flies here."""
-    from ftcc.groundside.swarm import examine
+    from ftcc.groundside.swarm import examine, speed_factor
 
     factor = speed_factor(speed, "--speed")
     mission = load_mission(scenario, None, variant, None, None, None)

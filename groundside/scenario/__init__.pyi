@@ -4,6 +4,8 @@ from .catalogue import forms_and_variants as forms_and_variants
 from .catalogue import read as read
 from .catalogue import shipped as shipped
 from .catalogue import summary as summary
+from .choosing import ScenarioWarning as ScenarioWarning
+from .choosing import mission_of as mission_of
 from .columns import LEADING as LEADING
 from .loading import Scenario as Scenario
 from .loading import load as load

@@ -28,7 +28,17 @@ from ftcc.groundside.scenario.settings import Settings, setting_texts
 from ftcc.groundside.scenario.validation import located_error, shortened, validate
 from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 
-__all__ = ["Scenario", "ScenarioError", "forms_and_variants", "load", "load_airframe", "read", "scenario_of", "shipped", "with_value"]
+__all__ = [
+    "Scenario",
+    "ScenarioError",
+    "forms_and_variants",
+    "load",
+    "load_airframe",
+    "read",
+    "scenario_of",
+    "shipped",
+    "with_value",
+]
 
 _VARIANT_KEYS = ("title", "forms", "claims_of")
 

@@ -34,7 +34,9 @@ class StudyFields(Strict):
     """What a study asks, and what it draws."""
 
     question: str = Field("", description="a sentence for the report")
-    of: str | None = Field(None, description="the scenario, in a file that holds nothing else; name, or path from there")
+    of: str | None = Field(
+        None, description="the scenario, in a file that holds nothing else; name, or path from there"
+    )
     form: str | None = Field(None, description="form of the law; default: the first one of the scenario")
     variants: list[str] = Field([], description="variants of the scenario")
     against: list[str] = Field([], description="variants with which every draw flies too, for comparison in pairs")

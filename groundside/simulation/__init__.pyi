@@ -4,7 +4,6 @@ from .cases import load_case as load_case
 from .flight import Flight as Flight
 from .one_process import PlainPython as PlainPython
 from .one_process import fly_in_memory as fly_in_memory
-from .simulating import ScenarioWarning as ScenarioWarning
 from .simulating import simulate as simulate
 from .space import TooLargeError as TooLargeError
 from .to_disk import fly_to_disk as fly_to_disk

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import overload
 
 from ftcc.groundside.results import Run, RunError, reserved_folder
-from ftcc.groundside.scenario import Mission, Scenario, Settings, load, resolve
+from ftcc.groundside.scenario import Mission, Scenario, Settings, mission_of
 from ftcc.groundside.simulation.flight import Flight
 from ftcc.groundside.simulation.one_process import Progress, fly_in_memory
 from ftcc.groundside.simulation.to_disk import fly_to_disk
 
-__all__ = ["ScenarioWarning", "simulate"]
-
-
-class ScenarioWarning(UserWarning):
-    """What `resolve` remarks about a scenario that can fly."""
+__all__ = ["simulate"]
 
 
 @overload
@@ -96,7 +91,7 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C in a flight in memory.
     """
-    mission = _mission_of(scenario, form=form, variants=variants, settings=settings, seed=seed, duration=duration)
+    mission = mission_of(scenario, form=form, variants=variants, settings=settings, seed=seed, duration=duration)
     if folder is None:
         flight = fly_in_memory(mission, progress, ready)
         if _ended_early(flight):
@@ -109,27 +104,6 @@ def simulate(
             raise RunError(
                 f"{path}: cannot be written: {error.strerror or error}; free some space, or give --out"
             ) from None
-
-
-def _mission_of(scenario: str | Path | Scenario | Mission, **options: Any) -> Mission:
-    """Return the mission to fly; warn of what a scenario that is resolved here remarks.
-
-    Raises
-    ------
-    TypeError
-        If there are options for what is loaded already.
-    """
-    if isinstance(scenario, Mission | Scenario):
-        if given := [name for name, value in options.items() if value not in (None, (), [], {}, "")]:
-            raise TypeError(f"simulate: {', '.join(given)}: give it to load, whose result is flown here")
-        if isinstance(scenario, Mission):
-            return scenario
-        mission = resolve(scenario)
-    else:
-        mission = resolve(load(scenario, **options))
-    for text in mission.warnings:
-        warnings.warn(f"{mission.name}: {text}", ScenarioWarning, stacklevel=3)
-    return mission
 
 
 def _ended_early(flight: Flight) -> bool:

@@ -1,3 +1,6 @@
+from .control import Control as Control
+from .control import SwarmError as SwarmError
+from .control import speed_factor as speed_factor
 from .conversation import NoAnswerError as NoAnswerError
 from .conversation import RefusedError as RefusedError
 from .conversation import StationError as StationError
@@ -10,9 +13,14 @@ from .launcher import Outcome as Outcome
 from .launcher import automatic_pack as automatic_pack
 from .launcher import no_main_module as no_main_module
 from .open_files import provide_files as provide_files
+from .preparing import check_choices as check_choices
+from .preparing import prepare_flight as prepare_flight
 from .registry import Entry as Entry
 from .registry import ask_swarm as ask_swarm
 from .registry import check_name as check_name
 from .registry import find_swarm as find_swarm
 from .registry import running_swarms as running_swarms
+from .scripted import Swarm as Swarm
 from .station import Station as Station
+from .station import VehicleState as VehicleState
+from .station import sizes_of_fault as sizes_of_fault

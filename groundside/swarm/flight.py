@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.dashboard import Event, Feed, Pace
 from ftcc.groundside.swarm.in_progress import FlightInProgress, Progress
-from ftcc.groundside.swarm.launcher import Outcome, Swarm, automatic_pack
+from ftcc.groundside.swarm.launcher import Outcome, SwarmProcesses, automatic_pack
 from ftcc.groundside.swarm.monitor import Monitor
 from ftcc.groundside.swarm.open_files import provide_files
 from ftcc.groundside.swarm.pace import Setup, usable_cores
@@ -136,9 +136,9 @@ def fly_swarm(
 
 def _start_swarm(
     mission: Mission, options: FlightOptions, ports: PortBlock, run_started: float, on_event: Callable[[Event], None]
-) -> Swarm:
+) -> SwarmProcesses:
     """Start all processes of the swarm."""
-    swarm = Swarm(
+    swarm = SwarmProcesses(
         mission,
         options.folder,
         ports,
@@ -260,7 +260,7 @@ def _dashboard(mission: Mission, options: FlightOptions, ports: PortBlock) -> An
 
 
 @contextlib.contextmanager
-def _stop_on_signals(swarm: Swarm) -> Iterator[None]:
+def _stop_on_signals(swarm: SwarmProcesses) -> Iterator[None]:
     """Stop the swarm on Ctrl-C and SIGTERM; do nothing outside of the main thread, which alone handles signals."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.dashboard import Event, Feed, Pace
 from ftcc.groundside.results import Run, RunError
-from ftcc.groundside.swarm.launcher import Swarm
+from ftcc.groundside.swarm.launcher import SwarmProcesses
 from ftcc.groundside.swarm.monitor import Monitor
 from ftcc.groundside.swarm.pacing import Pacing
 from ftcc.groundside.verdict import VERDICT_FILE, judge
@@ -33,7 +33,7 @@ class FlightInProgress:
     """A flight: its processes, its station, its dashboard, feed and log."""
 
     mission: Mission
-    swarm: Swarm
+    swarm: SwarmProcesses
     station: Monitor
     dashboard: Any
     feed: Feed | None
@@ -145,7 +145,7 @@ class FlightInProgress:
                 pace = self.pacing.pace
                 reached = None if math.isnan(pace.factor) else pace.factor
                 speeds = {"speed": pace.asked, "factor": reached, "limit": pace.limit, "advice": pace.advice}
-                return {"state": flow.state, "t": t, **speeds}
+                return {"state": flow.state, "t": t, **speeds, "died": self.swarm.outcome.died}
             case "stop":
                 self.swarm.stop()
             case "pause":

@@ -12,6 +12,7 @@ import multiprocessing.connection
 import os
 import selectors
 import sys
+import threading
 import time
 import types
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
     from ftcc.groundside.verdict import Verdict
 
-__all__ = ["Child", "Outcome", "Swarm", "automatic_pack"]
+__all__ = ["Child", "Outcome", "SwarmProcesses", "automatic_pack"]
 
 _END_TIMEOUT = 1.2
 """Time for processes to end by themselves, wall s."""
@@ -96,18 +97,23 @@ class Outcome:
         return not self.died and not self.lost
 
 
+_main_module_lock = threading.Lock()
+"""Swarms may be started by several threads."""
+
+
 @contextlib.contextmanager
 def no_main_module() -> Iterator[None]:
     """Keep children from importing the program that started this process."""
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = types.ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main
+    with _main_module_lock:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = types.ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = main
 
 
-class Swarm:
+class SwarmProcesses:
     """The processes of one run.
 
     Parameters

@@ -9,7 +9,7 @@ It speaks MAVLink with the autopilots, like any ground station, and finds their 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -18,7 +18,7 @@ from ftcc.link.failures import KINDS, UNITS, parameter_of
 from ftcc.link.flight_modes import code_of, mode_called
 from ftcc.link.mavlink import AUTOPILOT, dialect
 
-__all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState"]
+__all__ = ["ACTUATORS", "NoAnswerError", "RefusedError", "Station", "StationError", "VehicleState", "sizes_of_fault"]
 
 ACTUATORS = {
     "aileron": ("servo", 1),
@@ -33,6 +33,33 @@ ACTUATORS = {
 _NO_LOSS = {"loss": 0.0, "burst_s": 0.0, "burst_e": 1.0, "burst_l": 1.0}
 
 _PARTS = {**ACTUATORS, "position": ("gps", 1), "attitude": ("gyro", 1)}
+
+
+def sizes_of_fault(what: str, kind: str, given: Mapping[str, float]) -> dict[str, float]:
+    """Return all sizes of a fault: a size that is not given has no effect, whatever an earlier fault had.
+
+    Parameters
+    ----------
+    what, kind : as `Station.fault` takes them.
+    given : the sizes by name, as there; ``onset`` is the rate of both effectiveness and bias.
+
+    Raises
+    ------
+    StationError
+        If a fault of an actuator has neither effectiveness nor bias.
+    """
+    sizes = dict(given)
+    actuator = what not in ("position", "attitude")
+    onset = sizes.pop("onset", None)
+    if actuator and kind in ("wrong", "intermittent"):
+        if not {"effectiveness", "eff", "bias"} & set(sizes):
+            raise StationError(f"fault {what}: its size is missing; give --effectiveness, --bias or both")
+        if "eff" not in sizes:
+            sizes.setdefault("effectiveness", 1.0)
+        sizes.setdefault("bias", 0.0)
+    if actuator and kind == "wrong":
+        sizes = {"effectiveness_onset": onset or 0.0, "bias_onset": onset or 0.0} | sizes
+    return sizes
 
 
 @dataclass

@@ -14,9 +14,9 @@ from tests.sitl.conftest import Flight
 INTERRUPTED = """
 import sys
 from ftcc.groundside.cli import main
-from ftcc.groundside.swarm.launcher import Swarm
+from ftcc.groundside.swarm.launcher import SwarmProcesses
 
-spawn = Swarm._spawn
+spawn = SwarmProcesses._spawn
 
 def interrupted(self, context, kind, *rest):
     if kind == "autopilot":
@@ -24,7 +24,7 @@ def interrupted(self, context, kind, *rest):
         raise KeyboardInterrupt
     spawn(self, context, kind, *rest)
 
-Swarm._spawn = interrupted
+SwarmProcesses._spawn = interrupted
 sys.argv = ["ftcc", "fly", "demo", "--viewer", "none", "--mavlink", "none", "--out", sys.argv[1]]
 main()
 """

@@ -110,7 +110,7 @@ def test_a_mission_or_a_scenario_is_flown_as_it_is(flight: Flight) -> None:
     mission = resolve(scenario)
     for given in (scenario, mission):
         assert bits(simulate(given).to_arrow()) == bits(flight.to_arrow())
-        with pytest.raises(TypeError, match="simulate: seed: give it to load"):
+        with pytest.raises(TypeError, match="seed: give it to load"):
             simulate(given, seed=3)
     assert bits(fly_in_memory(mission).to_arrow()) == bits(flight.to_arrow())
 
