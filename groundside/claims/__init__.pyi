@@ -11,6 +11,7 @@ from .expressions import Signals as Signals
 from .expressions import check_expression as check_expression
 from .expressions import evaluate_expression as evaluate_expression
 from .expressions import names_in as names_in
+from .expressions import recorded_names as recorded_names
 from .expressions import uavs_in as uavs_in
 from .expressions import unwrapped as unwrapped
 from .expressions import window_of as window_of

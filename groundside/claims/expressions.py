@@ -33,6 +33,7 @@ __all__ = [
     "check_expression",
     "evaluate_expression",
     "names_in",
+    "recorded_names",
     "uavs_in",
     "unwrapped",
     "window_of",
@@ -180,6 +181,17 @@ def names_in(expression: str) -> frozenset[str]:
         elif not isinstance(node, (ast.operator, ast.unaryop, ast.expr_context)):
             raise ValueError(f"{expression!r}: only arithmetic over columns is allowed")
     return frozenset(name for key, name in names if key not in called)
+
+
+def recorded_names(expression: str) -> frozenset[str]:
+    """Return the recorded columns that an expression is computed from; those of `DERIVED` come from others.
+
+    Raises
+    ------
+    ValueError
+        If it is not arithmetic over columns.
+    """
+    return frozenset((_PLACES | _DISTANCES).get(name, name) for name in names_in(expression))
 
 
 def _subscript(expression: str, node: ast.Subscript) -> tuple[str, int]:

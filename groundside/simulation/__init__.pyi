@@ -1,6 +1,8 @@
 from .cases import cases_of as cases_of
 from .cases import claims_in_flight as claims_in_flight
 from .cases import load_case as load_case
+from .columns import NotRecordedError as NotRecordedError
+from .columns import columns_needed as columns_needed
 from .flight import Flight as Flight
 from .one_process import PlainPython as PlainPython
 from .one_process import fly_in_memory as fly_in_memory

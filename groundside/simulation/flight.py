@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.results import Recording, arrow_table
 from ftcc.groundside.scenario import Mission
+from ftcc.groundside.simulation.columns import NotRecordedError, places_kept, places_of
 from ftcc.groundside.verdict import Verdict, judge
-from ftcc.link.actuators import SLOT
 from ftcc.link.channel import LINK_REPORT
 from ftcc.link.recording import Column
 from ftcc.sim.obstacles import clearance, zones_of
-from ftcc.sim.plant import TRUTH
-from ftcc.sim.plants import conditions_of, find
 
 __all__ = ["Flight", "recorded_columns"]
 
@@ -33,7 +31,10 @@ def recorded_columns(mission: Mission) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Flight(Recording):
-    """A flight, or a part of one, in memory, with the same columns as a `Run`."""
+    """A flight, or a part of one, in memory, with the same columns as a `Run`.
+
+    If it was flown for some columns only, its parts hold these alone, in the same order.
+    """
 
     mission: Mission
     truth: NDArray[np.float64]
@@ -56,6 +57,8 @@ class Flight(Recording):
     """All other events: time s, UAV, severity, text."""
     first_report: int = 0
     """Number of the first report in ``links``."""
+    columns: frozenset[str] | None = None
+    """Columns that were asked for; None: all."""
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -64,27 +67,34 @@ class Flight(Recording):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self._places)
+        """Names of the columns of this mission's flights, whether this one recorded them or not."""
+        return (*places_of(self.mission), *(["clearance"] if self.mission.obstacles else []))
 
-    @property
-    def _places(self) -> dict[str, tuple[NDArray[np.float64], int]]:
-        places = {name: (self.truth, n) for n, name in enumerate(TRUTH)}
-        actuators = find(self.mission.plant).ACTUATORS
-        places |= {f"{name}_command": (self.command, SLOT[name]) for name in actuators}
-        places |= {name: (self.acting, SLOT[name]) for name in actuators}
-        places |= {name: (self.conditions, n) for n, (name, _) in enumerate(conditions_of(self.mission.plant))}
-        if self.mission.obstacles:
-            places["clearance"] = (self.clearance, 0)
-        return places | {quantity.name: (self.signals, n) for n, quantity in enumerate(self.mission.scheme.signals)}
+    @functools.cached_property
+    def _columns(self) -> dict[str, NDArray[np.float64]]:
+        """The recorded columns (n, k)."""
+        kept = places_kept(self.mission, self.columns)
+        return {
+            name: getattr(self, place.part)[:, :, kept[place.part].index(place.index)]
+            for name, place in places_of(self.mission).items()
+            if place.index in kept[place.part]
+        }
+
+    def _values(self, name: str) -> NDArray[np.float64]:
+        """Return a column of all UAVs (n, k)."""
+        if name == "clearance" and self.mission.obstacles:
+            return self.clearance
+        if name not in self._columns and name in self.names:
+            raise NotRecordedError(f"column {name} was not recorded; this flight has {', '.join(self._columns)}")
+        return self._columns[name]
 
     @functools.cached_property
     def clearance(self) -> NDArray[np.float64]:
-        """(n, k, 1): height above the obstacle below, m."""
+        """(n, k): height above the obstacle below, m."""
         zones = zones_of(self.mission.obstacles)
-        x, z = self.truth[:, :, TRUTH.index("x")], self.truth[:, :, TRUTH.index("z")]
+        x, z = self._values("x"), self._values("z")
         heights = [clearance(zones, *place) for place in zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)]
-        return np.array(heights).reshape(*x.shape, 1)
+        return np.array(heights).reshape(x.shape)
 
     @functools.cached_property
     def verdict(self) -> Verdict:
@@ -97,13 +107,18 @@ class Flight(Recording):
         return [int(rows) for rows in np.isfinite(self.truth[:, :, 0]).sum(axis=0)]
 
     def column(self, name: str, uav: int) -> NDArray[np.float64]:
-        """Return a column of one UAV in order of time, up to its loss."""
+        """Return a column of one UAV in order of time, up to its loss.
+
+        Raises
+        ------
+        NotRecordedError
+            If the flight was flown for other columns.
+        """
         i = self.mission.uavs.index(uav)
         rows = self._flown[i]
         if name == "t":
             return self.t[:rows]
-        values, n = self._places[name]
-        return values[:rows, i, n]
+        return self._values(name)[:rows, i]
 
     def link_table(self) -> dict[str, NDArray[Any]]:
         """Return the columns ``link.recording.LINK_COLUMNS``: a row per report and in-edge, by time, then receiver."""
@@ -128,15 +143,16 @@ class Flight(Recording):
         return {name: column[reported] for name, column in table.items()}
 
     def table(self) -> dict[str, NDArray[Any]]:
-        """Return all columns: a row per recorded tick and UAV, by time, then UAV."""
+        """Return all recorded columns: a row per recorded tick and UAV, by time, then UAV."""
         order = np.argsort(self.mission.uavs)
         flown = np.isfinite(self.truth[:, order, 0]).ravel()
         table: dict[str, NDArray[Any]] = {
             "t": np.repeat(self.t, len(order))[flown],
             "uav": np.tile(np.array(self.mission.uavs, np.int32)[order], len(self.t))[flown],
         }
-        for name, (values, n) in self._places.items():
-            table[name] = values[:, order, n].ravel()[flown]
+        derived = ["clearance"] if self.mission.obstacles and {"x", "z"} <= self._columns.keys() else []
+        for name in (*self._columns, *derived):
+            table[name] = self._values(name)[:, order].ravel()[flown]
         return table
 
     def to_arrow(self) -> Any:

@@ -31,7 +31,7 @@ from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import DIVERGED, TRUTH, X, Z
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["Recording", "World", "fly_ticks", "new_recording", "new_world"]
+__all__ = ["Kept", "Recording", "World", "fly_ticks", "new_recording", "new_world"]
 
 if "stages" not in globals() or "cycle" not in globals():
     raise ImportError(
@@ -64,9 +64,21 @@ _SETTLED = 1e-6
 """The exchange at one time is repeated until no shared value changes by more than this, in its unit."""
 
 
-class Recording(NamedTuple):
-    """Rows of the recording, by time, then UAV; nan after a UAV was lost."""
+class Kept(NamedTuple):
+    """Which entries of each part of a row are recorded."""
 
+    truth: NDArray[np.int64]
+    command: NDArray[np.int64]
+    acting: NDArray[np.int64]
+    conditions: NDArray[np.int64]
+    signals: NDArray[np.int64]
+
+
+class Recording(NamedTuple):
+    """Rows of the recording, by time, then UAV; nan after a UAV was lost. Each column lies in one piece."""
+
+    kept: Kept
+    """What is recorded of the following; all of it: as many columns as given there."""
     truth: NDArray[np.float64]
     """(n, k, 13)."""
     command: NDArray[np.float64]
@@ -93,15 +105,18 @@ class Recording(NamedTuple):
         self.first[:] = row, report
 
 
-def new_recording(rows: int, reports: int, widths: tuple[int, ...], edges: tuple[int, int]) -> Recording:
+def new_recording(rows: int, reports: int, kept: Kept, edges: tuple[int, int]) -> Recording:
     """Return an empty recording of ``rows`` ticks and ``reports`` reports on links.
 
-    ``widths`` are the numbers of columns of truth, commands, acting positions, conditions and signals. ``edges`` holds
-    the number of UAVs and the largest number of in-edges.
+    ``edges`` holds the number of UAVs and the largest number of in-edges.
     """
     k = edges[0]
-    truth, command, acting, conditions, signals = (np.full((rows, k, width), np.nan) for width in widths)
+    # Column by column: claims and verdicts read whole columns, each many times.
+    truth, command, acting, conditions, signals = (
+        np.full((rows, k, len(places)), np.nan, order="F") for places in kept
+    )
     return Recording(
+        kept=kept,
         truth=truth,
         command=command,
         acting=acting,
@@ -133,6 +148,8 @@ class World(NamedTuple):
     """(4,): scratch for a command as a message carries it."""
     target: NDArray[np.float64]
     """(5,): scratch for an attitude target."""
+    conditions: NDArray[np.float64]
+    """(c,): scratch for what only the simulator knows."""
 
 
 def new_world(
@@ -141,16 +158,20 @@ def new_world(
     timing: Timing,
     conditions: int,
     room: int | None = None,
+    kept: Sequence[Sequence[int]] | None = None,
 ) -> World:
     """Return the swarm before the first tick; ``conditions`` is the number of columns that only the simulator has.
 
-    The recording has space for ``room`` ticks, by default for all.
+    The recording has space for ``room`` ticks, by default for all, and for the columns ``kept``, in the order of
+    `Kept`, by default for all.
     """
     autopilots, inbox = build_autopilots(specs, timing)
     uavs = [spec.uav for spec in specs]
     senders = [[neighbour.uav for neighbour in spec.neighbours] for spec in specs]
     signals, values = autopilots.signals.shape[1], autopilots.shared.shape[1]
-    widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, signals)
+    if kept is None:
+        kept = [range(width) for width in (len(TRUTH), len(ACTUATORS), len(ACTUATORS), conditions, signals)]
+    kept_places = Kept(*(np.array(places, np.int64) for places in kept))
     last = (timing.ticks + 1 if room is None else room) - 1
     rows, reports = last // timing.record_every + 1, last // timing.report_every + 1
     return World(
@@ -159,12 +180,13 @@ def new_world(
         inbox=inbox,
         events=link_events(specs),
         exchange=new_exchange(uavs, senders, inbox.valid.shape[1], values),
-        recording=new_recording(rows, reports, widths, inbox.valid.shape),
+        recording=new_recording(rows, reports, kept_places, inbox.valid.shape),
         true=np.zeros((len(uavs), len(TRUTH))),
         measured=np.zeros(len(TRUTH)),
         state=np.zeros(len(StateMessage._fields)),
         controls=np.zeros(len(ACTUATORS)),
         target=np.zeros(len(AttitudeTarget._fields)),
+        conditions=np.zeros(conditions),
     )
 
 
@@ -310,18 +332,28 @@ def _settle_exchange(world, now, dt):
 
 
 @compiled
+def _keep(values, places, row):
+    """Copy the entries ``places`` of a vector into a row."""
+    for m in range(places.shape[0]):
+        row[m] = values[places[m]]
+
+
+@compiled
 def _record(world, timing, n):
     """Record a row of each flying UAV, and a report on each of its in-edges, if they are due."""
     recording, fleet, now = world.recording, world.fleet, n * timing.period_us
+    kept = recording.kept
     every, report_every = timing.record_every, ticks_a_second(timing.period_us)
     for i in range(recording.lost.shape[0]):
         if n % every == 0 and _flies(recording, i, now):
             row = n // every - recording.first[0]
-            copy(world.true[i], recording.truth[row, i])
-            copy(fleet.command[i], recording.command[row, i])
-            copy(fleet.acting[i], recording.acting[row, i])
-            _conditions(fleet, i, now / 1e6, recording.conditions[row, i])
-            copy(world.autopilots.signals[i], recording.signals[row, i])
+            _keep(world.true[i], kept.truth, recording.truth[row, i])
+            _keep(fleet.command[i], kept.command, recording.command[row, i])
+            _keep(fleet.acting[i], kept.acting, recording.acting[row, i])
+            if kept.conditions.shape[0] > 0:
+                _conditions(fleet, i, now / 1e6, world.conditions)
+                _keep(world.conditions, kept.conditions, recording.conditions[row, i])
+            _keep(world.autopilots.signals[i], kept.signals, recording.signals[row, i])
         if n % report_every == 0 and recording.lost[i] == 0:
             for edge in range(world.inbox.degree[i]):
                 report = n // report_every - recording.first[1]

@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from types import ModuleType
 from typing import Any
 
@@ -19,9 +20,10 @@ import psutil  # type: ignore[import-untyped]
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.leader import drain_leader_events
 from ftcc.groundside.scenario import Mission
+from ftcc.groundside.simulation.columns import places_kept
 from ftcc.groundside.simulation.flight import Flight
 from ftcc.groundside.simulation.space import recording_size, require_space
-from ftcc.link.compiled import instantiate, uncompile
+from ftcc.link.compiled import entry_of, instantiate, uncompile
 from ftcc.link.events import drain_events
 from ftcc.sim.obstacles import entered_text
 from ftcc.sim.plant import LOST
@@ -51,7 +53,10 @@ def loop_of(scheme: str, plant: str) -> ModuleType:
 
 
 def fly_in_memory(
-    mission: Mission, progress: Progress | None = None, ready: Callable[[], None] | None = None
+    mission: Mission,
+    progress: Progress | None = None,
+    ready: Callable[[], None] | None = None,
+    columns: Collection[str] | None = None,
 ) -> Flight:
     """Fly a mission in memory.
 
@@ -62,15 +67,19 @@ def fly_in_memory(
         Called with the simulated time, s.
     ready : callable, optional
         Called once when everything is compiled, before the first tick.
+    columns : collection of str, optional
+        What is recorded, such as `columns_needed(mission)`; by default all. The flight is the same.
 
     Raises
     ------
     TooLargeError
         If the recording does not fit into memory.
+    UserError
+        If the mission has no such column.
     """
     # Results that are computed from it need the same space again.
-    require_space(mission, 2 * recording_size(mission)[1], psutil.virtual_memory().available / 1e9, "memory")
-    return fly_in_parts(mission, mission.timing.ticks + 1, lambda _: None, progress, ready)
+    require_space(mission, 2 * recording_size(mission, columns)[1], psutil.virtual_memory().available / 1e9, "memory")
+    return fly_in_parts(mission, mission.timing.ticks + 1, lambda _: None, progress, ready, columns)
 
 
 def fly_in_parts(
@@ -79,14 +88,18 @@ def fly_in_parts(
     take: Callable[[Flight], None],
     progress: Progress | None,
     ready: Callable[[], None] | None,
+    columns: Collection[str] | None = None,
 ) -> Flight:
     """Fly a mission; pass the recording of every ``room`` ticks to ``take``, and return the last part."""
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant)
     if loop.stages.REFUSAL:
         warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
-    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room)
+    kept = list(places_kept(mission, columns).values())
+    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
+    flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording)
     loop.fly_ticks(world, timing, mission.wire, 0, 0)
+    fly_ticks = entry_of(loop.fly_ticks, world, timing, mission.wire, 0, 0)
     if ready is not None:
         ready()
     end = timing.ticks + 1
@@ -98,11 +111,11 @@ def fly_in_parts(
         try:
             if flown == taken + room:
                 with defer_interrupt():
-                    take(_flight_so_far(mission, world.recording, taken, flown, events))
+                    take(flight_so_far(taken, flown, events))
                     taken = flown
                     world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
             until = min(end, flown + chunk, taken + room)
-            loop.fly_ticks(world, timing, mission.wire, flown, until)
+            fly_ticks(world, timing, mission.wire, flown, until)
             events += _drain_all_events(mission, world.fleet, world.autopilots)
             flown = until
             if progress is not None:
@@ -110,7 +123,7 @@ def fly_in_parts(
         except KeyboardInterrupt:
             # The flight so far is recorded, and its verdict says that it ended early.
             interrupted = True
-    return _flight_so_far(mission, world.recording, taken, flown, events)
+    return flight_so_far(taken, flown, events)
 
 
 @contextlib.contextmanager
@@ -133,7 +146,12 @@ def defer_interrupt() -> Iterator[None]:
 
 
 def _flight_so_far(
-    mission: Mission, recording: Any, begin: int, end: int, events: list[tuple[float, int, str, str]]
+    mission: Mission,
+    columns: Collection[str] | None,
+    recording: Any,
+    begin: int,
+    end: int,
+    events: list[tuple[float, int, str, str]],
 ) -> Flight:
     """Return the recording of ticks ``begin`` .. ``end`` - 1, with all events so far."""
     timing = mission.timing
@@ -156,6 +174,7 @@ def _flight_so_far(
         },
         events=tuple(events),
         first_report=report,
+        columns=None if columns is None else frozenset(columns),
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario import Mission
-from ftcc.sim.plant import TRUTH
-from ftcc.sim.plants import conditions_of
+from ftcc.groundside.simulation.columns import places_kept
 
 __all__ = ["TooLargeError", "recording_size", "require_space"]
 
@@ -14,12 +15,12 @@ class TooLargeError(UserError):
     """The recording of a flight does not fit into memory or on the disk."""
 
 
-def recording_size(mission: Mission) -> tuple[int, float]:
-    """Return the rows of each UAV, and the size of the whole recording in memory, GB."""
+def recording_size(mission: Mission, columns: Collection[str] | None = None) -> tuple[int, float]:
+    """Return the rows of each UAV, and the size of a recording of these columns in memory, by default of all, GB."""
     timing, uavs = mission.timing, len(mission.uavs)
     rows = timing.ticks // timing.record_every + 1
-    columns = 2 + len(TRUTH) + 2 * 4 + len(conditions_of(mission.plant)) + len(mission.scheme.signals)
-    return rows, 8 * rows * uavs * columns / 1e9
+    width = 2 + sum(map(len, places_kept(mission, columns).values()))
+    return rows, 8 * rows * uavs * width / 1e9
 
 
 def require_space(mission: Mission, needed: float, free: float, of: str) -> None:

@@ -1,3 +1,4 @@
+from .judging import columns_judged as columns_judged
 from .judging import judge as judge
 from .verdict import AS_IT_SHOULD as AS_IT_SHOULD
 from .verdict import FAILED as FAILED

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.claims import Signals, evaluate_expression, names_in
+from ftcc.groundside.claims import Signals, evaluate_expression, names_in, recorded_names
 from ftcc.groundside.verdict.oscillation import is_forced, oscillation
 from ftcc.groundside.verdict.verdict import LimitCycle, Loss, Outside, Saturation, TrackingError, Verdict
 from ftcc.link.actuators import SLOT, unit_of
@@ -17,7 +17,7 @@ from ftcc.sim.plants import conditions_of, find
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["judge"]
+__all__ = ["columns_judged", "judge"]
 
 Array = NDArray[np.float64]
 _MEMORY = 32 << 20
@@ -47,6 +47,9 @@ _HULLS = {"x_d": ("hull_distance_x", "hull of the leaders' positions"),
           "z_d": ("hull_distance", "hull of the leaders' altitudes")}  # fmt: skip
 """Followers of several leaders must be between their altitudes and, if they track ``x_d``, between their positions."""
 
+_LED = ("z", "V")
+"""Columns of leaders whose oscillations followers follow."""
+
 
 def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, str]]) -> Verdict:
     """Judge how a flight went.
@@ -71,6 +74,20 @@ def judge(signals: Signals, mission: Mission, lost: Mapping[int, tuple[float, st
         limit_cycles=tuple(_limit_cycles(flight)),
         lost=tuple(_losses(flight)),
     )
+
+
+def columns_judged(mission: Mission) -> frozenset[str]:
+    """Return the recorded columns that `judge` may look at in a flight of this mission."""
+    scheme, plant = mission.scheme, mission.plant
+    expressions = [error.name for error in scheme.tracking]
+    expressions += [error.bound for error in scheme.tracking if isinstance(error.bound, str)]
+    for signal in scheme.signals:
+        if signal.bound is not None:
+            expressions += [signal.name, str(signal.bound)]
+    if len(mission.graph.leaders) > 1:
+        expressions += [distance for distance, _ in _HULLS.values()]
+    names = [*_LED, *(f"{name}_command" for name in find(plant).ACTUATORS), *_causes(mission)]
+    return frozenset(names).union(*map(recorded_names, expressions))
 
 
 class _Flight:
@@ -251,6 +268,12 @@ def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
                 yield uav, error.name, error.unit, error.name, floor
 
 
+def _causes(mission: Mission) -> list[str]:
+    """Return the columns of followers whose oscillations cause others."""
+    own = [signal.name for signal in mission.scheme.signals if signal.shown_as == "reference"]
+    return own + [name for name, _ in conditions_of(mission.plant)]
+
+
 def _commanded_frequencies(flight: _Flight) -> list[float]:
     """Return the frequencies that the scenario or the ground station causes, rad/s.
 
@@ -258,9 +281,7 @@ def _commanded_frequencies(flight: _Flight) -> list[float]:
     as an intermittent fault.
     """
     signals = flight.signals
-    own = [s.name for s in flight.mission.scheme.signals if s.shown_as == "reference"]
-    conditions = [name for name, _ in conditions_of(flight.mission.plant) if name in signals.names]
-    columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in ("z", "V")]
-    columns += [(uav, name) for name in own + conditions for uav in flight.followers]
+    columns = [(uav, name) for uav in flight.graph.leaders if uav in flight.until for name in _LED]
+    columns += [(uav, name) for name in _causes(flight.mission) if name in signals.names for uav in flight.followers]
     found = (oscillation(flight.times(uav), signals.column(name, uav)) for uav, name in columns)
     return [one.frequency for one in found if one is not None]
