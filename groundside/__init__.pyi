@@ -13,6 +13,9 @@ from .simulation import Flight as Flight
 from .simulation import fly_in_memory as fly_in_memory
 from .simulation import fly_to_disk as fly_to_disk
 from .simulation import simulate as simulate
+from .studies import Study as Study
+from .studies import StudyError as StudyError
+from .studies import study as study
 from .swarm import NoAnswerError as NoAnswerError
 from .swarm import RefusedError as RefusedError
 from .swarm import Station as Station

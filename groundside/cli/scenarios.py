@@ -27,7 +27,7 @@ from ftcc.groundside.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from ftcc.groundside.scenario import Scenario
+    from ftcc.groundside.scenario import Mission, Scenario
 
 __all__ = ["check", "list_all", "simulate", "verify"]
 
@@ -146,6 +146,9 @@ def simulate(
     seed: Seed = None,
     out: Out = None,
     settings: Settings = None,
+    row: Annotated[
+        int | None, typer.Option("--row", metavar="N", help="Fly flight N of a study: its folder, or its scenario.")
+    ] = None,
     strict: Strict = False,
 ) -> None:
     """Fly a scenario in one process, as fast as possible, and record it."""
@@ -153,7 +156,10 @@ def simulate(
 
     from ftcc.groundside.simulation import simulate as simulate_mission
 
-    mission = load_mission(scenario, form, variant, settings, seed, duration)
+    if row is None:
+        mission = load_mission(scenario, form, variant, settings, seed, duration)
+    else:
+        mission = _mission_of_row(scenario, row, form, variant, settings, seed, duration)
     folder = new_run_folder(mission, out)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"))
     with Progress(*columns, console=terminal(stderr=True), transient=True) as progress:
@@ -176,6 +182,31 @@ def simulate(
     judged(run.verdict, strict)
     if run.lost or run.verdict.flown < mission.timing.duration:
         raise typer.Exit(1)
+
+
+def _mission_of_row(
+    study: str,
+    row: int,
+    form: str | None,
+    variant: str,
+    settings: list[str] | None,
+    seed: int | None,
+    duration: float | None,
+) -> Mission:
+    """One flight of a study: of its folder, or as the study of a file would fly it."""
+    from ftcc.groundside.studies import is_study, load_plan, mission_of_row, plan_study
+
+    if is_study(study):
+        if form or variant or settings or seed is not None or duration is not None:
+            fail(f"--row: {study} says what flies; it takes no other options")
+        plan = load_plan(study)
+    else:
+        variants = [one.strip() for one in variant.split(",") if one.strip()]
+        options = {"form": form, "variants": variants, "settings": settings or [], "seed": seed, "duration": duration}
+        plan = plan_study(study, **options)  # type: ignore[arg-type]
+    if not 0 <= row < plan.count:
+        fail(f"--row {row}: the study has flights 0 to {plan.count - 1}")
+    return mission_of_row(plan, row)
 
 
 def verify(

@@ -88,6 +88,8 @@ def find(name_or_path: str | Path) -> Path:
         return shipped()[str(name_or_path)]
     if path.is_dir() and (path / "scenario.toml").is_file():
         return path / "scenario.toml"
+    if (path / "study.toml").is_file():
+        raise ScenarioError(path, ["is a study, and no scenario: ftcc simulate STUDY --row N flies one of its flights"])
     if path.is_file():
         if whole := _belongs_to(path):
             raise ScenarioError(path, [f"is a part of {whole.name}, and no scenario by itself: give {whole}"])

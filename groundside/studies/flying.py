@@ -12,7 +12,7 @@ from typing import Any
 from ftcc.groundside.claims import evaluate, tolerance_of
 from ftcc.groundside.results import Run
 from ftcc.groundside.scenario import Mission
-from ftcc.groundside.simulation import Flight, fly_in_memory, simulate
+from ftcc.groundside.simulation import Flight, columns_needed, fly_in_memory, simulate
 from ftcc.groundside.studies.plan import StudyPlan
 
 __all__ = ["Outcome", "fly_trial", "mission_of_row", "run_folder"]
@@ -112,8 +112,9 @@ def _flown(
     record_in: Path | None,
     progress: Callable[[float], None] | None,
 ) -> Outcome:
+    asked = replace(mission, claims=plan.claims)
     flight: Flight | Run = (
-        fly_in_memory(mission, progress)
+        fly_in_memory(mission, progress, columns=columns_needed(asked))
         if record_in is None
         else simulate(mission, run_folder(record_in, number), progress)
     )
