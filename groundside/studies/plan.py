@@ -38,6 +38,8 @@ _ATTEMPTS = 200
 """Draws after which a study with ``redraw`` gives up on a flight."""
 _EDGES = (0.001, 0.999)
 """Quantiles of each random quantity that are checked before anything starts."""
+_TRIED, _SHOWN = 32, 10
+"""Draws among which a flight is looked for that can fly, and reasons that are shown if none can."""
 _AIRFRAME = "airframe.toml"
 
 
@@ -108,28 +110,30 @@ class StudyPlan:
         return self.draws.count * len(self.combinations)
 
     @functools.cached_property
-    def flyable(self) -> int:
-        """Return the first combination that can fly with medians for all draws.
+    def flyable(self) -> tuple[int, tuple[Any, ...]]:
+        """Return a combination, and values of the random quantities, that can fly: the medians, or else a draw's.
 
         Raises
         ------
         StudyError
-            If there is none.
+            If there is none among the first draws.
         """
         problems = []
-        for n in range(len(self.combinations)):
-            try:
-                self._resolved(n, self.draws.middle(), self.draws.seed)
-            except ScenarioError as error:
-                problems += error.problems
-            else:
-                return n
-        raise StudyError("no combination can fly:\n" + "\n".join(dict.fromkeys(problems)))
+        first = range(min(self.draws.count, _TRIED) if self.draws.quantities else 0)
+        for values in itertools.chain([self.draws.middle()], map(self.draws.values, first)):
+            for n in range(len(self.combinations)):
+                try:
+                    self._resolved(n, values, self.draws.seed)
+                except ScenarioError as error:
+                    problems += error.problems
+                else:
+                    return n, values
+        raise StudyError("no combination can fly:\n" + "\n".join(list(dict.fromkeys(problems))[:_SHOWN]))
 
     @functools.cached_property
     def mission(self) -> Mission:
-        """Return a mission with medians for all draws, for properties that all flights share."""
-        return self._resolved(self.flyable, self.draws.middle(), self.draws.seed)
+        """Return the mission of `flyable`, for properties that all flights share."""
+        return self._resolved(*self.flyable, self.draws.seed)
 
     def is_own_case(self, mission: Mission) -> bool:
         """Return whether a mission is the scenario's own case, but for its seed and duration."""
@@ -469,7 +473,7 @@ def _check_values(plan: StudyPlan) -> None:
             shares[place] = edge
             plan.scenario(0, plan.draws.at(shares), seed)
     claims = [claim.model_dump(by_alias=True, exclude_none=True) for claim in plan.claims]
-    resolve(plan.scenario(plan.flyable, middle, seed, claims))
+    resolve(plan.scenario(*plan.flyable, seed, claims))
 
 
 def _one_by_one(variations: Sequence[Variation]) -> Iterator[tuple[Any, ...]]:

@@ -21,7 +21,8 @@ from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation.cases import claims_in_flight
-from ftcc.groundside.study import Outcome, draw, flights, fly_all, plan_study, table, write
+from ftcc.groundside.studies import Study, StudyPlan, engine, fly_study, open_folder, plan_study
+from ftcc.groundside.studies.campaign import Progress
 from tests.support.guests import EXAMPLE, forget_schemes, install
 
 SECONDS = 2.0
@@ -60,13 +61,18 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def flown(scenario: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
     """A study of loss, and of a gain of which one value is refused; its table as read back, and its folder."""
-    study = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
-    outcomes: list[Outcome] = []
-    assert fly_all(study, 2, outcomes.append)
+    plan = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
     folder = tmp_path_factory.mktemp("study")
-    write(study, outcomes, folder)
-    assert {path.name for path in draw(study, outcomes, folder)} == {"study.png", "study.pdf"}
+    study = flown_in(folder, plan, jobs=2)
+    names = {path.name for path in study.draw()}
+    assert names == {f"{name}.{kind}" for name in ("study", "shares") for kind in ("png", "svg", "pdf")}
     return pq.read_table(folder / "study.parquet"), folder
+
+
+def flown_in(folder: Path, plan: StudyPlan, jobs: int = 1) -> Study:
+    """A whole study, flown into a folder."""
+    assert fly_study(plan, open_folder(plan, folder), jobs=jobs)
+    return Study(folder)
 
 
 @pytest.mark.parametrize(
@@ -94,8 +100,8 @@ def test_all_combinations_fly_with_the_same_seeds(flown: tuple[Any, Path]) -> No
     rows = flown[0].select(["flight", "channel.loss", "gains.phi", "seed"]).to_pylist()
     assert [tuple(row.values()) for row in rows] == [
         (n, loss, phi, seed)
-        for n, (loss, phi, seed) in enumerate(
-            (loss, phi, seed) for loss in (0.0, 0.3) for phi in (0.1, TOO_STEEP) for seed in (5, 6)
+        for n, (seed, loss, phi) in enumerate(
+            (seed, loss, phi) for seed in (5, 6) for loss in (0.0, 0.3) for phi in (0.1, TOO_STEEP)
         )
     ]
 
@@ -109,12 +115,12 @@ def test_values_are_those_of_the_flight_alone(flown: tuple[Any, Path], scenario:
     assert (row["verdict"], row["largest error"]) == (flight.verdict.word, flight.verdict.tracking[0].largest)
     assert row["later"] is None
     assert row["later holds"] is None
-    assert row["wall"] > 0.0
 
 
 def test_a_seed_is_that_of_gusts_too() -> None:
-    study = plan_study("fire_monitoring", seeds=2, duration=SECONDS)
-    second, alone = study.mission_of(study.trials[1]), resolve(load("fire_monitoring", seed=2, duration=SECONDS))
+    plan = plan_study("fire_monitoring", seeds=2, duration=SECONDS)
+    _, second, _ = plan.drawn(plan.trial(1))
+    alone = resolve(load("fire_monitoring", seed=2, duration=SECONDS))
     assert second is not None
     assert (second.vehicles, second.timing) == (alone.vehicles, alone.timing)
     assert {spec.gust.seed for spec in alone.vehicles} == {2}
@@ -124,6 +130,7 @@ def test_a_combination_that_is_refused_is_a_row_with_its_reason(flown: tuple[Any
     for row in flown[0].to_pylist():
         if row["gains.phi"] == TOO_STEEP:
             assert "unstable in Euler steps" in row["error"]
+            assert row["refused"]
             assert row["hull"] is None
             assert (row["verdict"], row["largest error"]) == (None, None)
         else:
@@ -137,12 +144,9 @@ def test_only_bounds_are_judged_where_the_settings_are_not_those_of_the_case(flo
     assert {(row["channel.loss"], row["hull holds"]) for row in rows} == {(0.0, False), (0.3, False)}
 
 
-def test_a_lost_aircraft_is_reported_and_fails_its_claims(scenario: Path) -> None:
+def test_a_lost_aircraft_is_reported_and_fails_its_claims(scenario: Path, tmp_path: Path) -> None:
     settings = ["start.uav.1.gamma=0.5", "plant.guards.flight_path_angle=0.501"]
-    study = plan_study(scenario, settings=settings, duration=SECONDS)
-    outcomes: list[Outcome] = []
-    assert fly_all(study, 1, outcomes.append)
-    (row,) = table(study, outcomes).to_pylist()
+    (row,) = flown_in(tmp_path, plan_study(scenario, settings=settings, duration=SECONDS)).table.to_pylist()
     assert row["lost"] == [1]
     assert row["error"].startswith("UAV 1 lost at ")
     assert (row["altitude, UAV 1"], row["altitude holds"]) == (None, False)
@@ -154,7 +158,7 @@ def test_the_table_says_units_tolerances_and_what_was_flown(flown: tuple[Any, Pa
         b"unit": b"m", b"meaning": b"mean of z over 0 to 2 s", b"expected": b"1005", b"tolerance": b"3",
         b"source": b"test",
     }  # fmt: skip
-    assert schema.metadata[b"ftcc.study"] == b"1"
+    assert schema.metadata[b"ftcc.study"] == b"2"
     assert schema.metadata[b"ftcc.case"] == b"flight"
     assert (flown[1] / "study.png").stat().st_size > 10_000
 
@@ -176,13 +180,11 @@ def test_a_process_that_dies_and_an_exception_are_rows(tmp_path: Path, monkeypat
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     # Plain Python there, and nothing to prepare here: nothing need be compiled.
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    monkeypatch.setattr(flights, "fly_in_memory", lambda mission: None)
+    monkeypatch.setattr(engine, "fly_in_memory", lambda mission: None)
     forget_schemes()
     try:
-        study = plan_study(EXAMPLE / "consensus.toml", ["gains.k_c=1,2,3,4"], settings=["scheme=deadly"], duration=0.1)
-        outcomes: list[Outcome] = []
-        assert fly_all(study, 2, outcomes.append)
-        errors = table(study, outcomes).column("error").to_pylist()
+        plan = plan_study(EXAMPLE / "consensus.toml", ["gains.k_c=1,2,3,4"], settings=["scheme=deadly"], duration=0.1)
+        errors = flown_in(tmp_path / "study", plan, jobs=2).table.column("error").to_pylist()
     finally:
         monkeypatch.undo()
         forget_schemes()
@@ -222,38 +224,38 @@ def wait_until(condition: Callable[[], bool], process: subprocess.Popen[bytes], 
 
 
 def test_one_job_needs_no_other_process_and_gives_the_same(
-    flown: tuple[Any, Path], scenario: Path, monkeypatch: pytest.MonkeyPatch
+    flown: tuple[Any, Path], scenario: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(flights, "multiprocessing", None)
-    study = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
-    outcomes: list[Outcome] = []
-    assert fly_all(study, 1, outcomes.append)
-    assert table(study, outcomes).drop(["wall"]).equals(flown[0].drop(["wall"]))
+    monkeypatch.setattr(engine, "multiprocessing", None)
+    plan = plan_study(scenario, ["channel.loss=0,.3", f"gains.phi=0.1,{TOO_STEEP}"], seeds=2, seed=5)
+    flown_in(tmp_path, plan)
+    assert (tmp_path / "study.parquet").read_bytes() == (flown[1] / "study.parquet").read_bytes()
 
 
 @pytest.mark.parametrize("error", [OSError(30, "Read-only file system"), OSError(28, "full"), ImportError("none")])
 def test_without_semaphores_all_fly_in_this_process_with_a_warning(
-    scenario: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, tmp_path: Path
 ) -> None:
     class Context:
         def Event(self) -> None:  # noqa: N802 (the library's name)
             raise error
 
-    monkeypatch.setattr(flights.multiprocessing, "get_context", lambda _: Context())
-    outcomes: list[Outcome] = []
+    monkeypatch.setattr(engine.multiprocessing, "get_context", lambda _: Context())
     with pytest.warns(RuntimeWarning, match=rf"{getattr(error, 'strerror', None) or error}.*run in this one"):
-        assert fly_all(plan_study(scenario, seeds=2), 2, outcomes.append)
-    assert [outcome.problem for outcome in outcomes] == ["", ""]
+        study = flown_in(tmp_path, plan_study(scenario, seeds=2), jobs=2)
+    assert study.table.column("error").to_pylist() == [None, None]
 
 
-def test_ctrl_c_in_this_process_reports_nothing_of_the_flight_that_it_cuts_short(scenario: Path) -> None:
-    outcomes: list[Outcome] = []
+def test_ctrl_c_in_this_process_reports_nothing_of_the_flight_that_it_cuts_short(
+    scenario: Path, tmp_path: Path
+) -> None:
+    plan = plan_study(scenario, seeds=1000)
 
-    def report(outcome: Outcome) -> None:
-        outcomes.append(outcome)
-        if len(outcomes) == 2:
+    def report(now: Progress) -> None:
+        if now.flown == 2:
             threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
 
-    assert not fly_all(plan_study(scenario, seeds=1000), 1, report)
-    assert 2 <= len(outcomes) < 1000
-    assert {outcome.verdict.flown for outcome in outcomes if outcome.verdict} == {SECONDS}
+    assert not fly_study(plan, open_folder(plan, tmp_path), jobs=1, report=report)
+    table = Study(tmp_path).table
+    assert 2 <= len(table) < 1000
+    assert set(table.column("altitude holds").to_pylist()) == {True}  # a flight that was cut short decides nothing
