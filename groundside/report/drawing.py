@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
-from ftcc.groundside.canvas import Line2D, plt
+from ftcc.groundside.canvas import INK, STYLE, WIDTH, Line2D, plt
 from ftcc.groundside.claims import unwrapped
 from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
@@ -26,14 +22,12 @@ if TYPE_CHECKING:
 
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Drawn", "draw", "draw_timeline", "figure_of", "save"]
+__all__ = ["draw", "draw_timeline", "figure_of"]
 
 Array = NDArray[np.float64]
 
-_INK = "#010203"
-"""Placeholder for the text colour, which the page replaces by its own, so that figures suit light and dark."""
-_WIDTH, _ROW, _LEGEND = 7.2, 1.9, 0.35
-"""Width of a figure, height of a row of panels, height of the legend, inches."""
+_ROW, _LEGEND = 1.9, 0.35
+"""Height of a row of panels, height of the legend, inches."""
 _TALL = 2.0
 """Height of a row with equal axes, in rows."""
 _IN_A_ROW = 3
@@ -47,48 +41,6 @@ _COLUMNS = 700
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
 """Colours of compared runs."""
 
-_STYLE: Any = {
-    "font.family": "sans-serif",
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": _INK,
-    "axes.labelcolor": _INK,
-    "axes.grid": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 5),
-    "grid.color": "#808890",
-    "grid.alpha": 0.25,
-    "grid.linewidth": 0.5,
-    "text.color": _INK,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "lines.linewidth": 1.0,
-    "legend.frameon": False,
-    "legend.fontsize": 7.5,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "ftcc",
-    "pdf.fonttype": 42,
-    "savefig.transparent": True,
-}
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A drawn figure and its files."""
-
-    name: str
-    title: str
-    number: str
-    svg: str
-    files: tuple[Path, ...]
-
-
 def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1) -> Any | None:
     """Draw panels of one flight, coloured by UAV, or of several, coloured by flight; None if no flight has the data.
 
@@ -97,7 +49,7 @@ def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1
     panels = [panel for panel in candidates if any(drawable(panel, flight) for flight in flights)]
     if not panels:
         return None
-    with plt.rc_context(_STYLE):
+    with plt.rc_context(STYLE):
         wide = [i for i, panel in enumerate(panels) if panel.window is None]
         details = [i for i, panel in enumerate(panels) if panel.window is not None]
         rows = [wide[i : i + columns] for i in range(0, len(wide), columns)]
@@ -105,7 +57,7 @@ def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1
         width = int(np.lcm.reduce([len(row) for row in rows]))
         heights = [_TALL if any(panels[i].equal for i in row) else 1.0 for row in rows]
         mosaic: Any = [[str(i) for i in row for _ in range(width // len(row))] for row in rows]
-        size = (_WIDTH, _LEGEND + _ROW * sum(heights))
+        size = (WIDTH, _LEGEND + _ROW * sum(heights))
         figure, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
         for i, panel in enumerate(panels):
             _draw_panel(axes[str(i)], panel, flights)
@@ -125,7 +77,7 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
             if panel.pairs is not None and not several:
                 color = hexadecimal(colors(range(1, len(panel.pairs) + 1))[k + 1])
             if panel.shared and not several:
-                color = _INK
+                color = INK
             y = curve.y if panel.turn is None else unwrapped(curve.y, panel.turn)
             style = "--" if curve.uav in leaders and panel.pairs is None else "-"
             axes.plot(*_thinned(curve.x, y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
@@ -191,7 +143,7 @@ def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
                 axes.plot(x, sign * y, "--", color=hexadecimal(GRAY), linewidth=0.8, zorder=2)
     if panel.true is not None:
         for curve in curves_of(panel.true, flight, panel.uavs, None, panel.window, panel.x):
-            axes.plot(*_thinned(curve.x, curve.y), ":", color=_INK, linewidth=0.9, zorder=5)
+            axes.plot(*_thinned(curve.x, curve.y), ":", color=INK, linewidth=0.9, zorder=5)
 
 
 def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
@@ -217,7 +169,7 @@ def _legend(figure: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> N
     if any(panel.limits for panel in panels):
         entries.append(Line2D([], [], color=gray, linestyle=":", label="limit"))
     if any(panel.reference for panel in panels):
-        entries.append(Line2D([], [], color=_INK, linestyle="--", linewidth=0.5, label="reference"))
+        entries.append(Line2D([], [], color=INK, linestyle="--", linewidth=0.5, label="reference"))
     shown = {panel.surroundings for panel in panels}
     if "obstacles" in shown and flights[0].mission.obstacles:
         entries.append(Line2D([], [], color=gray, linewidth=5.0, alpha=0.35, label="obstacle"))
@@ -226,7 +178,7 @@ def _legend(figure: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> N
         entries.append(Line2D([], [], color=red, linestyle="--", label="fire, first"))
         entries.append(Line2D([], [], color=red, label="fire, last"))
     if any(panel.true for panel in panels):
-        entries.append(Line2D([], [], color=_INK, linestyle=":", label="true value"))
+        entries.append(Line2D([], [], color=INK, linestyle=":", label="true value"))
     if entries:
         figure.legend(handles=entries, loc="outside upper center", ncols=min(len(entries), 8), handlelength=1.6)
 
@@ -263,8 +215,8 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
     places = {uav: -i for i, uav in enumerate(rows)}
     tints = {"info": GRAY, "warning": (214, 140, 20), "error": (214, 48, 48)}
     shapes = {"info": "o", "warning": "D", "error": "X"}
-    with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(figsize=(_WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
         for event in marked:
             uav = event.get("uav")
             severity = str(event.get("severity", "info"))
@@ -285,8 +237,8 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
 
 def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
     """Draw curves (name, colour, times, values) of non-negative quantities over time, with the axis from zero."""
-    with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(figsize=(_WIDTH, _LEGEND + _ROW), layout="constrained")
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(WIDTH, _LEGEND + _ROW), layout="constrained")
         for name, color, t, y in curves:
             axes.plot(*_thinned(t, y), color=color, label=name)
         axes.set(xlabel="t, s", ylabel=label)
@@ -294,41 +246,6 @@ def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> An
         axes.set_ylim(bottom=0.0)
         figure.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
     return figure
-
-
-def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
-    """Write a figure as SVG, PDF and PNG, and close it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    buffer = io.StringIO()
-    files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
-    with plt.rc_context(_STYLE):
-        # Compute the layout once, not for each format.
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-        files[0].write_text(_small(buffer.getvalue()), encoding="utf-8")
-        figure.savefig(files[1], metadata={"CreationDate": None})
-        figure.savefig(files[2], dpi=160, transparent=False)
-    plt.close(figure)
-    return Drawn(name, title, number, _for_page(files[0].read_text(encoding="utf-8"), title, name), files)
-
-
-def _small(svg: str) -> str:
-    """Round the coordinates of curves to a tenth of a point."""
-    return re.sub(r'\bd="[^"]+"', lambda path: re.sub(r"(\d+\.\d)\d+", r"\1", path[0]), svg)
-
-
-def _for_page(svg: str, title: str, name: str) -> str:
-    """Convert an SVG file to an element of a page: text in the page's colour, unique ids, a title."""
-    body = svg[svg.index("<svg") :].replace(_INK, "currentColor")
-    body = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', body)
-    body = re.sub(r'(xlink:href="|url\()#', rf"\1#{name}-", body)
-    return re.sub(
-        r"<svg([^>]*?) (width|height)=\"[^\"]*\"([^>]*?)>",
-        rf'<svg\1\3 role="img" aria-label="{title}">',
-        body,
-        count=1,
-    )
 
 
 def _thinned(x: Array, y: Array) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from ftcc.groundside.text import ids
 from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict, with_unit
 
 if TYPE_CHECKING:
-    from ftcc.groundside.report.drawing import Drawn
+    from ftcc.groundside.canvas import Drawn
 
 __all__ = [
     "Cell",
@@ -27,6 +27,7 @@ __all__ = [
     "plural",
     "verdict_section",
     "write",
+    "write_html",
 ]
 
 
@@ -86,14 +87,21 @@ class Page:
 
 def write(page: Page, path: Path) -> Path:
     """Write a page as one HTML file that includes its figures, and return its path."""
+    return write_html("page.html.jinja", path, **vars(page), contents=page.contents)
+
+
+def write_html(template: str, path: Path, beside: Path | None = None, **content: Any) -> Path:
+    """Fill a template of this room, or of the folder ``beside``, write it as a page, and return its path."""
     import jinja2
 
+    here = Path(__file__).parent
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
+        loader=jinja2.FileSystemLoader([here] if beside is None else [beside, here]),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    html = environment.get_template("page.html.jinja").render(**vars(page), contents=page.contents)
-    path.write_text(html, encoding="utf-8")
+    path.write_text(environment.get_template(template).render(**content), encoding="utf-8")
     return path
 
 
