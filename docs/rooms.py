@@ -14,7 +14,7 @@ WINGS = ("airside", "groundside", "link", "sim")
 
 LABELS = {
     "cli": "the command ftcc",
-    "study": "many flights",
+    "studies": "many flights",
     "report": "page, figures",
     "swarm": "flight with processes",
     "simulation": "flight in one process",

@@ -20,12 +20,14 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
-__all__ = ["INK", "STYLE", "WIDTH", "Drawn", "Line2D", "plt", "save"]
+__all__ = ["DPI", "INK", "STYLE", "WIDTH", "Drawn", "Line2D", "plt", "save"]
 
 INK = "#010203"
 """Placeholder for the text colour, which the page replaces by its own, so that figures suit light and dark."""
 WIDTH = 7.2
 """Width of a figure, inches."""
+DPI = 160
+"""Resolution of PNG files."""
 
 STYLE: Any = {
     "font.family": "sans-serif",
@@ -68,6 +70,10 @@ class Drawn:
     svg: str
     files: tuple[Path, ...]
 
+    def _repr_html_(self) -> str:
+        """Return the figure as a notebook shows it."""
+        return self.svg
+
 
 def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
     """Write a figure as SVG, PDF and PNG, and close it."""
@@ -81,7 +87,7 @@ def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn
         figure.savefig(buffer, format="svg", metadata={"Date": None})
         files[0].write_text(_small(buffer.getvalue()), encoding="utf-8")
         figure.savefig(files[1], metadata={"CreationDate": None})
-        figure.savefig(files[2], dpi=160, transparent=False)
+        figure.savefig(files[2], dpi=DPI, transparent=False)
     plt.close(figure)
     return Drawn(name, title, number, _for_page(files[0].read_text(encoding="utf-8"), title, name), files)
 

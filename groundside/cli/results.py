@@ -7,14 +7,20 @@ from typing import Annotated
 
 import typer
 
-from ftcc.groundside.cli.common import Strict, end_by, terminal, warn
+from ftcc.groundside.cli.common import Strict, end_by, fail, terminal, warn
 
 __all__ = ["compare", "report"]
 
 
 def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
-    json: Annotated[bool, typer.Option("--json", help="Print verdict and claims as JSON.")] = False,
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or of a study.")],
+    json: Annotated[
+        bool, typer.Option("--json", help="Print verdict and claims, or a study's answers, as JSON.")
+    ] = False,
+    latex: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of a study: export the answers as a table for LaTeX; -: print it."),
+    ] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Export all signals as CSV.")] = None,
     mat: Annotated[Path | None, typer.Option(metavar="FILE", help="Export all signals for MATLAB.")] = None,
     kml: Annotated[Path | None, typer.Option(metavar="FILE", help="Export a track per UAV for Google Earth.")] = None,
@@ -23,11 +29,23 @@ def report(
     page: Annotated[bool, typer.Option(help="Write RUN/report, a page with all figures.")] = True,
     strict: Strict = False,
 ) -> None:
-    """Show the verdict and the claims of a run, and write a page with its figures; exit code 1 if a claim fails."""
+    """Show the verdict and the claims of a run, and write a page with its figures; exit code 1 if a claim fails.
+
+    Of a study: show how often its claims hold, and write a page with intervals, figures and failed flights.
+    """
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import as_json, show, write_report
     from ftcc.groundside.results import NothingRecordedError, Run, RunError, export
+    from ftcc.groundside.studies import is_study
 
+    if is_study(run):
+        given = {"--csv": csv, "--mat": mat, "--kml": kml, "--gpx": gpx, "--ulog": ulog, "--strict": strict}
+        for option in (option for option, value in given.items() if value):
+            fail(f"{option}: is for a run; {run} is a study, whose table is study.parquet")
+        _report_study(run, json, latex, page)
+        return
+    if latex is not None:
+        fail(f"--latex: is for a study; {run} is none")
     recorded = Run(run)
     exports = {"csv": csv, "mat": mat, "kml": kml, "gpx": gpx, "ulog": ulog}
     written = terminal(stderr=True)
@@ -57,6 +75,33 @@ def report(
         end_by(recorded.verdict)
     if failed(results):
         raise typer.Exit(1)
+
+
+def _report_study(folder: Path, json: bool, latex: Path | None, page: bool) -> None:
+    """Show the answers of a study, and write what is asked for."""
+    from ftcc.groundside.studies import Study, StudyError, as_json, show
+
+    study = Study(folder)
+    if not study.answers.draws:
+        raise StudyError(f"{folder}: no flight is finished yet; to go on: ftcc study {folder} --resume")
+    printed = latex == Path("-")
+    if json and printed:
+        fail("--json and --latex -: both print; give one, or --latex a file")
+    written = terminal(stderr=True)
+    if json:
+        print(as_json(study.answers))
+    elif printed:
+        print(study.latex(), end="")
+    else:
+        show(terminal(), study.answers)
+    if latex is not None and not printed:
+        try:
+            latex.write_text(study.latex(), encoding="utf-8")
+        except OSError as error:
+            raise StudyError(f"--latex {latex}: cannot be written: {error.strerror or error}") from None
+        written.print(f"wrote {latex}", highlight=False, soft_wrap=True)
+    if page and not json and not printed:
+        written.print(f"wrote {study.report()}", markup=False, highlight=False, soft_wrap=True)
 
 
 def compare(

@@ -174,22 +174,13 @@ def _duration(seconds: float) -> str:
 
 def _show(folder: Path) -> int:
     """Draw the figures; show the answers, the errors, and what was written; return how many flights broke off."""
-    from ftcc.groundside.studies import Study, summary, summary_of_sensitivities
+    from ftcc.groundside.studies import Study, show
 
-    screen = terminal()
-    read = Study(folder)
+    screen, read = terminal(), Study(folder)
     if not len(read.table):
         return 0
-    screen.print(summary(read.answers))
-    if (indices := summary_of_sensitivities(read.answers)) is not None:
-        screen.print(indices)
-    for sentence in read.answers.sentences():
-        screen.print(sentence, markup=False, highlight=False, soft_wrap=True)
-    unflown = [error for error, word in zip(*(read.table.column(name).to_pylist() for name in ("error", "verdict")), strict=True)
-               if word is None]  # fmt: skip
-    for error in dict.fromkeys(unflown):
-        screen.print(f"{unflown.count(error)} x {error}", markup=False, highlight=False, soft_wrap=True)
+    show(screen, read.answers)
     files = [folder / "study.parquet", *read.draw()]
     screen.print(f"wrote {', '.join(map(str, files))}", markup=False, highlight=False, soft_wrap=True)
-    refused = sum(read.table.column("refused").to_pylist())
-    return len(unflown) - refused if read.plan.draws.quantities else len(unflown)
+    broken = len(read.answers.errors(refused=False))
+    return broken if read.plan.draws.quantities else broken + len(read.answers.errors(refused=True))

@@ -41,6 +41,7 @@ _COLUMNS = 700
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
 """Colours of compared runs."""
 
+
 def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1) -> Any | None:
     """Draw panels of one flight, coloured by UAV, or of several, coloured by flight; None if no flight has the data.
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftcc.groundside.palette import colors, hexadecimal
 from ftcc.groundside.canvas import save
+from ftcc.groundside.palette import colors, hexadecimal
 from ftcc.groundside.report.drawing import figure_of
 from ftcc.groundside.report.page import Cell, Head, Section
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ftcc.groundside.canvas import Drawn, save
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import Sheet, sheet_of
-from ftcc.groundside.canvas import Drawn, save
 from ftcc.groundside.report.drawing import draw, draw_timeline
 from ftcc.groundside.report.links import links_section
 from ftcc.groundside.report.page import (

@@ -8,6 +8,7 @@ from .folders import reserved_folder as reserved_folder
 from .folders import sole_writer as sole_writer
 from .recording import MissingPackageError as MissingPackageError
 from .recording import Recording as Recording
+from .recording import require as require
 from .run import Run as Run
 from .table import TableWriter as TableWriter
 from .table import arrow_table as arrow_table

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ftcc.groundside.claims import Result
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["MissingPackageError", "Recording"]
+__all__ = ["MissingPackageError", "Recording", "require"]
 
 
 class MissingPackageError(UserError):
@@ -57,7 +57,7 @@ class Recording(abc.ABC):
         MissingPackageError
             If pandas is not installed.
         """
-        _require("pandas")
+        require("pandas", "to_arrow()")
         table = self.to_arrow()
         frame = table.to_pandas()
         frame.attrs["units"] = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
@@ -71,7 +71,7 @@ class Recording(abc.ABC):
         MissingPackageError
             If polars is not installed.
         """
-        return _require("polars").from_arrow(self.to_arrow())
+        return require("polars", "to_arrow()").from_arrow(self.to_arrow())
 
     def claims(self) -> list[Result]:
         """Compare the claims of the flight's case with the recording; see `claims.Result`."""
@@ -81,13 +81,19 @@ class Recording(abc.ABC):
         return evaluate(self, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
-def _require(package: str) -> Any:
-    """Import an optional package."""
+def require(package: str, instead: str) -> Any:
+    """Import an optional package; ``instead`` names what does without it.
+
+    Raises
+    ------
+    MissingPackageError
+        If it is not installed.
+    """
     try:
         return importlib.import_module(package)
     except ModuleNotFoundError as error:
         if error.name != package:
             raise
         raise MissingPackageError(
-            f"to_{package}: {package} is not installed; install it with: pip install {package}, or use to_arrow()"
+            f"to_{package}: {package} is not installed; install it with: pip install {package}, or use {instead}"
         ) from None

@@ -1,6 +1,12 @@
 from .answers import HEADLINE as HEADLINE
 from .answers import Answers as Answers
 from .answers import percent as percent
+from .campaign import Progress as Progress
+from .campaign import fly_study as fly_study
+from .campaign import larger as larger
+from .campaign import open_folder as open_folder
+from .campaign import study as study
+from .documents import as_json as as_json
 from .engine import Engine as Engine
 from .engine import catch_ctrl_c as catch_ctrl_c
 from .engine import fly_all as fly_all
@@ -13,12 +19,6 @@ from .folder import is_study as is_study
 from .folder import load_plan as load_plan
 from .plan import StudyPlan as StudyPlan
 from .plan import plan_study as plan_study
-from .rows import table_of as table_of
-from .campaign import Progress as Progress
 from .results import Study as Study
-from .campaign import fly_study as fly_study
-from .campaign import larger as larger
-from .campaign import open_folder as open_folder
-from .campaign import study as study
-from .summary import summary as summary
-from .summary import summary_of_sensitivities as summary_of_sensitivities
+from .rows import table_of as table_of
+from .summary import show as show

@@ -28,13 +28,13 @@ from ftcc.groundside.verdict import FAILED
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["HEADLINE", "NOBODY_LOST", "NOT_FAILED", "Answers", "Sensitivity", "label_of", "percent"]
+__all__ = ["HEADLINE", "NOBODY_LOST", "NOT_FAILED", "QUANTILES", "Answers", "Sensitivity", "label_of", "percent"]
 
 HEADLINE = "all of it"
 """The answer that comes first: nobody was lost and every judged claim holds; without judged claims, the verdict."""
 NOBODY_LOST = "nobody lost"
 NOT_FAILED = "verdict is not failed"
-_QUANTILES = (0.05, 0.5, 0.95)
+QUANTILES = (0.05, 0.5, 0.95)
 
 Array = NDArray[np.float64]
 
@@ -59,17 +59,21 @@ class Answers:
         self.table = table
         self.labels = [label_of(plan, n) for n in range(len(plan.combinations))]
         numbers = table.column("flight").to_numpy()
-        self._draw, self._combination = np.divmod(numbers, len(self.labels))
-        self.draws = int(self._draw.max()) + 1 if len(numbers) else 0
+        self.draw_of, self._combination = np.divmod(numbers, len(self.labels))
+        self.draws = int(self.draw_of.max()) + 1 if len(numbers) else 0
         self.refused = self._column("refused") == 1.0
         """Flights that the checks refused."""
         self.flown = self._spread([word is not None for word in table.column("verdict").to_pylist()]) == 1.0
         """Flights that there are to judge."""
 
+    def rows_of(self, combination: int) -> NDArray[np.intp]:
+        """Return the places in the table of a combination's flights."""
+        return np.flatnonzero(self._combination == combination)
+
     def _spread(self, values: Sequence[Any] | Array) -> Array:
         """Return a column by draw and combination."""
         spread = np.full((self.draws, len(self.labels)), np.nan)
-        spread[self._draw, self._combination] = np.array([np.nan if one is None else one for one in values], float)
+        spread[self.draw_of, self._combination] = np.array([np.nan if one is None else one for one in values], float)
         return spread
 
     def _column(self, name: str) -> Array:
@@ -101,7 +105,9 @@ class Answers:
             lost = self._spread([len(one) for one in self.table.column("lost").to_pylist()])
             return self._of_begun(lost == 0.0)
         if title == NOT_FAILED:
-            return self._of_begun(self._spread([one == FAILED for one in self.table.column("verdict").to_pylist()]) == 0.0)
+            return self._of_begun(
+                self._spread([one == FAILED for one in self.table.column("verdict").to_pylist()]) == 0.0
+            )
         return self._column(f"{title} holds")
 
     def _of_begun(self, good: NDArray[np.bool_]) -> Array:
@@ -111,7 +117,7 @@ class Answers:
     @functools.cached_property
     def _there(self) -> NDArray[np.bool_]:
         there = np.zeros((self.draws, len(self.labels)), bool)
-        there[self._draw, self._combination] = True
+        there[self.draw_of, self._combination] = True
         return there
 
     def share(self, title: str, combination: int) -> Share:
@@ -126,7 +132,17 @@ class Answers:
     def quantiles(self, measure: Measure, combination: int) -> tuple[Estimate, ...] | None:
         """Return the 5 %, 50 % and 95 % quantiles, with intervals by order statistics; None without numbers."""
         known = self._known(self.values(measure), combination)
-        return tuple(quantile(known, q) for q in _QUANTILES) if len(known) else None
+        return tuple(quantile(known, q) for q in QUANTILES) if len(known) else None
+
+    def errors(self, refused: bool) -> list[str]:
+        """Return why flights were refused by the checks, or else why they broke off, a text per flight."""
+        columns = (self.table.column(name).to_pylist() for name in ("error", "verdict", "refused"))
+        return [error or "" for error, word, no in zip(*columns, strict=True) if word is None and bool(no) == refused]
+
+    def failed(self) -> list[int]:
+        """Return the numbers of all flights in which not all holds."""
+        draw, combination = np.nonzero(self.holds(HEADLINE) == 0.0)
+        return [int(number) for number in draw * len(self.labels) + combination]
 
     def paired(self, title: str, combination: int) -> Paired:
         """Compare the first combination with another one, draw by draw."""

@@ -7,14 +7,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ftcc.groundside.studies.answers import Answers, percent
+from ftcc.groundside.studies.reasons import reasons_in
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
-__all__ = ["summary", "summary_of_sensitivities"]
+__all__ = ["show", "summary", "summary_of_sensitivities"]
 
 _COLUMNS = 8
 """Largest number of combinations on a terminal."""
+
+
+def show(console: Console, answers: Answers) -> None:
+    """Print the answers, and by kind why flights were refused or broke off."""
+    console.print(summary(answers))
+    if (indices := summary_of_sensitivities(answers)) is not None:
+        console.print(indices)
+    reasons = reasons_in([*answers.errors(refused=True), *answers.errors(refused=False)])
+    for line in [*answers.sentences(), *(reason.line for reason in reasons)]:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def summary(answers: Answers) -> Table:
@@ -38,7 +50,9 @@ def summary(answers: Answers) -> Table:
         cells = []
         for n in places:
             found = answers.quantiles(measure, n)
-            cells.append("-" if found is None else f"{found[1].value:.4g}, {found[0].value:.3g} to {found[2].value:.3g}")
+            cells.append(
+                "-" if found is None else f"{found[1].value:.4g}, {found[0].value:.3g} to {found[2].value:.3g}"
+            )
         unit = measure.claim.unit
         shown.add_row(escape(measure.name + (f", {unit}" if unit else "")), *cells)
     return shown
