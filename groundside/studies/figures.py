@@ -309,9 +309,8 @@ FIGURES = {
     ),
     "sensitivities": Figure(
         sensitivities,
-        "Sobol' indices, with 95 % intervals: which share of the variance a random quantity explains. Wider "
-        "bars and intervals, of few samples, go on beyond the frame. In brackets: base samples all of whose flights gave "
-        "a number",
+        "Sobol' indices, with 95 % intervals: which share of the variance a random quantity explains. Wider bars and "
+        "intervals, of few samples, go on beyond the frame. In brackets: base samples all of whose flights gave a number",
     ),
 }
 """Figures by the name of their files."""
