@@ -310,7 +310,7 @@ FIGURES = {
     "sensitivities": Figure(
         sensitivities,
         "Sobol' indices, with 95 % intervals: which share of the variance a random quantity explains. Wider bars and "
-        "intervals, of few samples, go on beyond the frame. In brackets: base samples all of whose flights gave a number",
+        "intervals, of few samples, go on beyond the frame. In brackets: base samples that count",
     ),
 }
 """Figures by the name of their files."""
