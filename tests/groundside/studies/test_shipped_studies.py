@@ -3,7 +3,7 @@
 import pytest
 
 from ftcc.groundside.scenario import read, shipped
-from ftcc.groundside.studies.plan import plan_study
+from ftcc.groundside.studies import plan_study
 
 STUDIED = (
     "attitude_synchronization",
