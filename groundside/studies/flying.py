@@ -14,6 +14,7 @@ from ftcc.groundside.results import Run
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation import Flight, columns_needed, fly_in_memory, simulate
 from ftcc.groundside.studies.plan import StudyPlan
+from ftcc.groundside.verdict import Verdict
 
 __all__ = ["Outcome", "fly_trial", "mission_of_row", "run_folder"]
 
@@ -36,6 +37,8 @@ class Outcome:
     """How the flight went; None if it did not fly."""
     largest: float | None = None
     """Largest value of the scheme's first tracking error."""
+    end_margin: float | None = None
+    """1 - end / allowed of the scheme's first tracking error, see ``verdict``; None: no such error, or none allowed."""
     refused: bool = False
     """Whether the checks of scenarios refused it."""
     error: str = ""
@@ -129,8 +132,14 @@ def _flown(
         lost=tuple(sorted(flight.lost)),
         verdict=verdict.word,
         largest=verdict.tracking[0].largest if verdict.tracking else None,
+        end_margin=_end_margin(verdict),
         error="; ".join(lost),
     )
+
+
+def _end_margin(verdict: Verdict) -> float | None:
+    error = verdict.tracking[0] if verdict.tracking else None
+    return None if error is None or error.end is None or not error.allowed else 1.0 - error.end / error.allowed
 
 
 def _holds(result: Any, own_case: bool) -> bool | None:

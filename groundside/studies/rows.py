@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SCHEMA_VERSION", "Dataset", "kind_of", "table_of", "write_table"]
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Version of the columns of ``study.parquet``."""
 _FLIGHTS = "flights"
 _TABLE = "study.parquet"
@@ -52,6 +52,8 @@ def schema_of(plan: StudyPlan) -> pa.Schema:
     if tracked:
         about = {"unit": tracked[0].unit, "meaning": f"largest of all UAVs, abs({tracked[0].name})"}
         fields.append(pa.field("largest error", pa.float64(), metadata=about))
+        about = {"unit": "-", "meaning": f"1 - end / allowed of abs({tracked[0].name}), as in the verdict"}
+        fields.append(pa.field("end margin", pa.float64(), metadata=about))
     fields += [
         pa.field("verdict", pa.string(), metadata={"meaning": "how the flight went"}),
         pa.field("lost", pa.list_(pa.int32()), metadata={"meaning": "UAVs"}),
@@ -73,8 +75,8 @@ def table_of(plan: StudyPlan, outcomes: Iterable[Outcome]) -> pa.Table:
     """Return flights as a ``pyarrow.Table``, one row per flight, by number.
 
     Columns: ``flight``, the varied keys, ``draw``, the drawn keys, ``seed``; for each claim its value under the claim's
-    name, and ``NAME holds``; ``largest error`` (of the scheme's first tracking error), ``verdict``, ``lost`` (ids),
-    ``refused``, ``error`` (text). Null: not flown, or no such number.
+    name, and ``NAME holds``; ``largest error`` and ``end margin`` (of the scheme's first tracking error), ``verdict``,
+    ``lost`` (ids), ``refused``, ``error`` (text). Null: not flown, or no such number.
     """
     import pyarrow as pa
 
@@ -97,7 +99,7 @@ def _row(plan: StudyPlan, outcome: Outcome) -> tuple[Any, ...]:
         row += [measure.of(outcome.values) for measure in group]
         row.append(outcome.holds[titles.index(title)] if outcome.holds else None)
     if plan.mission.scheme.tracking:
-        row.append(outcome.largest)
+        row += [outcome.largest, outcome.end_margin]
     return (*row, outcome.verdict, list(outcome.lost), outcome.refused, outcome.error or None)
 
 
