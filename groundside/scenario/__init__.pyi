@@ -7,6 +7,7 @@ from .catalogue import summary as summary
 from .choosing import ScenarioWarning as ScenarioWarning
 from .choosing import mission_of as mission_of
 from .columns import LEADING as LEADING
+from .faults import TrimDemand as TrimDemand
 from .loading import Scenario as Scenario
 from .loading import load as load
 from .loading import load_airframe as load_airframe
@@ -14,6 +15,7 @@ from .loading import scenario_of as scenario_of
 from .loading import with_value as with_value
 from .mission import Mission as Mission
 from .mission import resolve as resolve
+from .mission import trims_under_faults as trims_under_faults
 from .settings import Settings as Settings
 from .settings import setting_texts as setting_texts
 from .validation import validate as validate

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 from types import ModuleType
 
 from ftcc.airside.references.profiles import Profile
@@ -15,7 +17,15 @@ from ftcc.sim.faults import INTERMITTENT, STUCK, WRONG, Fault
 from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["actuator_faults", "check_fault_times", "check_faults", "fault_texts", "navigation_faults"]
+__all__ = [
+    "TrimDemand",
+    "actuator_faults",
+    "check_fault_times",
+    "check_faults",
+    "fault_texts",
+    "navigation_faults",
+    "trim_demands",
+]
 
 _KINDS = {"stuck": STUCK, "intermittent": INTERMITTENT}
 _PARTS = {"position": navigation.POSITION, "attitude": navigation.ATTITUDE}
@@ -113,37 +123,79 @@ def _fault_text(fault: FaultFields) -> str:
     return f"{what} {fault.kind}"
 
 
-def check_faults(
-    plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
-) -> None:
-    """Refuse a fault without a level trim: (needed deflection - bias) / effectiveness must be within the travel.
+@dataclass(frozen=True)
+class TrimDemand:
+    """What level flight asks of a faulty actuator."""
+
+    at: float
+    """Time, s."""
+    speed: float
+    """Airspeed, m/s."""
+    needed: float
+    """Deflection of the level trim, rad, or thrust, N."""
+    low: float
+    high: float
+    """Travel of the command."""
+
+    def command(self, effectiveness: float, bias: float) -> float:
+        """Return the command that gives the needed deflection; inf if none does."""
+        return (self.needed - bias) / effectiveness if effectiveness > 0.0 else math.inf
+
+    def margin(self, effectiveness: float, bias: float) -> float:
+        """Return how far that command is from the nearer end of its travel, over half the travel; <= 0: no level trim.
+
+        A dead actuator that stands where level flight needs it has all its margin, 1.
+        """
+        if effectiveness == 0.0 and self.needed == bias:
+            return 1.0
+        command = self.command(effectiveness, bias)
+        if math.isinf(self.high - self.low):
+            return 1.0 if self.low < command < self.high else -1.0
+        return 2.0 * min(command - self.low, self.high - command) / (self.high - self.low)
+
+
+def trim_demands(
+    plan: Plan,
+    plant: ModuleType,
+    vehicles: list[VehicleSpec],
+    profiles: dict[int, Profile],
+    n: int,
+    findings: Findings,
+) -> Iterator[TrimDemand]:
+    """Yield what level flight asks of the actuator of fault ``n``, at each time and speed of the fault.
 
     The trim is computed at the mission's speed or, if leaders change their speed, at each speed that they command
     during the fault. It includes the disturbances of that time; an oscillating one counts with its mean, 0. The air is
-    still.
+    still. Of stuck, slow and intermittent actuators, and of navigation, nothing is asked.
     """
-    by_uav = {vehicle.uav: vehicle for vehicle in vehicles}
+    fault = plan.faults[n]
+    if fault.actuator is None or fault.kind not in ("wrong", "off"):
+        return
+    vehicle = next(vehicle for vehicle in vehicles if vehicle.uav == fault.uav)
+    later = [f.at for f in _with_repairs(plan) if _part(f) == _part(fault) and f.at > fault.at]
+    low, high = vehicle.limits[SLOT[fault.actuator]]
+    times = times_to_check(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
+    for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:
+        acting = disturbances_at(vehicle, plant, at)
+        steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
+        yield TrimDemand(at, speed, steady.get(fault.actuator, 0.0), low, high)
+
+
+def check_faults(
+    plan: Plan, plant: ModuleType, vehicles: list[VehicleSpec], profiles: dict[int, Profile], findings: Findings
+) -> None:
+    """Refuse a fault without a level trim: (needed deflection - bias) / effectiveness must be within the travel."""
     for n, fault in enumerate(plan.faults):
-        if fault.actuator is None or fault.kind not in ("wrong", "off"):
-            continue
         remaining = 0.0 if fault.kind == "off" else fault.effectiveness
-        vehicle = by_uav[fault.uav]
-        later = [f.at for f in _with_repairs(plan) if _part(f) == _part(fault) and f.at > fault.at]
-        low, high = vehicle.limits[SLOT[fault.actuator]]
-        times = times_to_check(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
-        for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:
-            acting = disturbances_at(vehicle, plant, at)
-            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
-            needed = steady.get(fault.actuator, 0.0)
-            command = (needed - fault.bias) / remaining if remaining > 0.0 else math.inf
-            if low < command < high or (remaining == 0.0 and needed == fault.bias):
+        for demand in trim_demands(plan, plant, vehicles, profiles, n, findings):
+            if demand.margin(remaining, fault.bias) > 0.0:
                 continue
-            unit = unit_of(fault.actuator)
+            unit = unit_of(str(fault.actuator))
             text = (
                 f"faults.{n} (effectiveness {remaining:g}, bias {fault.bias:g} {unit}): leaves "
-                f"UAV {fault.uav} no level trim at {speed:g} m/s and t = {at:g} s: {fault.actuator} would need "
-                f"the command ({needed:.3f} - {fault.bias:g})/{remaining:g} = {command:.3f} {unit}; "
-                f"allowed is {low:g} to {high:g}"
+                f"UAV {fault.uav} no level trim at {demand.speed:g} m/s and t = {demand.at:g} s: {fault.actuator} would "
+                f"need the command ({demand.needed:.3f} - {fault.bias:g})/{remaining:g} = "
+                f"{demand.command(remaining, fault.bias):.3f} {unit}; allowed is {demand.low:g} to {demand.high:g}"
             )
             if fault.without_trim:
                 findings.warn(text)

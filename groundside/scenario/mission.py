@@ -34,7 +34,7 @@ from ftcc.groundside.scenario.checks import (
     timing_of,
 )
 from ftcc.groundside.scenario.columns import leading_columns
-from ftcc.groundside.scenario.faults import check_fault_times, check_faults
+from ftcc.groundside.scenario.faults import TrimDemand, check_fault_times, check_faults, trim_demands
 from ftcc.groundside.scenario.fire import check_posts
 from ftcc.groundside.scenario.laws import check_scheme, gains_of, initial_shared_values
 from ftcc.groundside.scenario.leaders import check_clearance, limit_climb_rates, profiles_of
@@ -55,7 +55,7 @@ from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import NO_TURBULENCE
 
-__all__ = ["Mission", "resolve"]
+__all__ = ["Mission", "resolve", "trims_under_faults"]
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,31 @@ def resolve(scenario: Scenario) -> Mission:
         home=(plan.home.latitude, plan.home.longitude, plan.home.altitude),
         events=planned_events(plan, basis.plant),
     )
+
+
+def trims_under_faults(scenario: Scenario) -> dict[int, tuple[TrimDemand, ...]]:
+    """Return what level flight asks of each faulty actuator, by the number of the fault.
+
+    A fault may leave no level trim; the checks that refuse it, and those of the law, are not made.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario has no aircraft to compute with.
+    """
+    plan, findings = scenario.plan, Findings(scenario)
+    basis = _basis(scenario, findings)
+    profiles = profiles_of(plan, basis.graph, findings)
+    findings.stop_if_refused()
+    model = nominal_model(plan, basis.sheet, basis.limits)
+    vehicles = vehicles_of(
+        plan, basis.plant, basis.airframe, model, basis.limits, basis.graph, profiles, basis.timing, findings
+    )
+    findings.stop_if_refused()
+    faults = range(len(plan.faults)) if plan.fire is None else ()
+    demands = {n: tuple(trim_demands(plan, basis.plant, vehicles, profiles, n, findings)) for n in faults}
+    findings.stop_if_refused()
+    return demands
 
 
 class _Basis(NamedTuple):
