@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, swarms, view
+from ftcc.groundside.cli import airframe, failures, fly, ground, map, results, scenarios, study, swarms, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.cli.examples import EXAMPLES
 from ftcc.groundside.cli.version import show_versions
@@ -32,6 +32,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         scenarios.simulate,
         scenarios.verify,
         study.study,
+        map.map_,
         airframe.airframe,
     ),
     "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),
@@ -118,7 +119,7 @@ for _title, _commands in _SECTIONS.items():
                 _sub.cls = _Command
             app.add_typer(_command, cls=_Group, rich_help_panel=_title)
         else:
-            app.command(_command.__name__.removesuffix("_all"), cls=_Command, rich_help_panel=_title)(_command)
+            app.command(_command.__name__.removesuffix("_all").removesuffix("_"), cls=_Command, rich_help_panel=_title)(_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -13,7 +13,7 @@ from ftcc.groundside.cli.common import Duration, Form, Out, Seed, Settings, Vari
 if TYPE_CHECKING:
     from ftcc.groundside.studies import Progress, StudyPlan
 
-__all__ = ["Cluster", "Jobs", "study"]
+__all__ = ["Cluster", "Jobs", "fly_with_progress", "study"]
 
 Jobs = Annotated[int | None, typer.Option(help="Number of processes; default: one per core.")]
 Cluster = Annotated[
@@ -99,7 +99,7 @@ def study(
         planned = _planned(scenario, options, rule is not None)
     folder = open_folder(planned, out, resume)
     begun = time.monotonic()
-    complete, last = _fly(planned, folder, jobs=jobs, cluster=cluster, until=rule, record=record)
+    complete, last = fly_with_progress(planned, folder, jobs=jobs, cluster=cluster, until=rule, record=record)
     took = time.monotonic() - begun
     broken = _show(folder)
     terminal().print(
@@ -138,7 +138,7 @@ def _resumed(folder: Path, options: dict[str, Any]) -> StudyPlan:
     return larger(plan, samples) if samples else plan
 
 
-def _fly(planned: StudyPlan, folder: Path, **options: Any) -> tuple[bool, Progress]:
+def fly_with_progress(planned: StudyPlan, folder: Path, **options: Any) -> tuple[bool, Progress]:
     """Fly a study with progress on the terminal; return whether none is missing, and how far it came."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import Progress as Bar
