@@ -119,7 +119,8 @@ for _title, _commands in _SECTIONS.items():
                 _sub.cls = _Command
             app.add_typer(_command, cls=_Group, rich_help_panel=_title)
         else:
-            app.command(_command.__name__.removesuffix("_all").removesuffix("_"), cls=_Command, rich_help_panel=_title)(_command)
+            _name = _command.__name__.removesuffix("_all").removesuffix("_")
+            app.command(_name, cls=_Command, rich_help_panel=_title)(_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -81,7 +81,8 @@ def terminal(stderr: bool = False) -> Console:
     from ftcc.groundside.cli.narrow import Terminal
 
     stream = sys.stderr if stderr else sys.stdout
-    return Terminal(stderr=stderr, width=None if stream.isatty() else _PIPE_WIDTH)
+    # Text such as a:b:3 is no emoji.
+    return Terminal(stderr=stderr, width=None if stream.isatty() else _PIPE_WIDTH, emoji=False)
 
 
 def _say(text: str, style: str) -> None:

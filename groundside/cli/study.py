@@ -71,7 +71,7 @@ def study(
 ) -> None:
     """Fly a scenario many times: over settings, seeds, and random values; say how often its claims hold."""
     from ftcc.groundside.statistics import DESIGNS, until_of
-    from ftcc.groundside.studies import fly_study, is_study, open_folder
+    from ftcc.groundside.studies import is_study, open_folder
 
     if jobs is not None and jobs < 1:
         fail(f"--jobs {jobs}: must be at least 1")

@@ -193,8 +193,8 @@ def check_faults(
             unit = unit_of(str(fault.actuator))
             text = (
                 f"faults.{n} (effectiveness {remaining:g}, bias {fault.bias:g} {unit}): leaves "
-                f"UAV {fault.uav} no level trim at {demand.speed:g} m/s and t = {demand.at:g} s: {fault.actuator} would "
-                f"need the command ({demand.needed:.3f} - {fault.bias:g})/{remaining:g} = "
+                f"UAV {fault.uav} no level trim at {demand.speed:g} m/s and t = {demand.at:g} s: {fault.actuator} "
+                f"would need the command ({demand.needed:.3f} - {fault.bias:g})/{remaining:g} = "
                 f"{demand.command(remaining, fault.bias):.3f} {unit}; allowed is {demand.low:g} to {demand.high:g}"
             )
             if fault.without_trim:

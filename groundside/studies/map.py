@@ -31,6 +31,8 @@ _FINE = 200
 """Points along each axis of a curve that needs no flight plan per point."""
 _MOST_CELLS = 100_000
 _FAULT = re.compile(r"faults\.(\d+)\.(.+)")
+_VALUE = re.compile(r" = [-+\d.e]+( [^:,]+)?:")
+"""The value of one cell in the text of a check."""
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 Array = NDArray[np.float64]
@@ -46,7 +48,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Curve:
-    """A boundary that theory draws: where ``height``, over ``x`` and ``y``, is 0; where it is positive, theory agrees."""
+    """A boundary that theory draws: ``height`` over ``x`` and ``y`` is 0 there, and positive where theory agrees."""
 
     label: str
     x: Array
@@ -259,7 +261,7 @@ class Map:
                 violated[cells] = 1.0
                 height = 0.5 - self._grid(violated)
                 x, y = np.array(self.x.values), np.array(self.y.values)
-                curves.append(Curve(f"check: {words[kind]}", x, y, height, False))
+                curves.append(Curve(f"check: {_VALUE.sub(':', words[kind])}", x, y, height, False))
         return curves
 
     def sentences(self) -> list[str]:
