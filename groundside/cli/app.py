@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, failures, fly, ground, map, results, scenarios, study, swarms, view
+from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, swarms, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.cli.examples import EXAMPLES
+from ftcc.groundside.cli.map import map_
 from ftcc.groundside.cli.version import show_versions
 from ftcc.groundside.errors import UserError
 from ftcc.link.folders import NoFolderError
@@ -32,7 +33,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         scenarios.simulate,
         scenarios.verify,
         study.study,
-        map.map_,
+        map_,
         airframe.airframe,
     ),
     "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),

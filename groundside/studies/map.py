@@ -165,7 +165,7 @@ class Map:
         values = np.zeros(self.plan.count)
         for number, refused in zip(*(self._table.column(n).to_pylist() for n in ("flight", "refused")), strict=True):
             values[number] = refused
-        return self._grid(values) == 1.0
+        return np.equal(self._grid(values), 1.0)
 
     def _grid(self, values: Array) -> Array:
         return values.reshape(len(self.x.values), len(self.y.values)).T

@@ -17,7 +17,7 @@ __all__ = ["draw_map"]
 
 _COLOURS = "RdBu"
 """Red to blue through white: told apart by all common kinds of colour vision."""
-_LINES = (("C1", "--"), ("0.35", "-."), ("C4", ":"), ("C2", "--"))
+_LINES: tuple[tuple[str, Any], ...] = (("C1", "--"), ("0.35", "-."), ("C4", ":"), ("C2", "--"))
 _MOST_CURVES = 6
 
 
