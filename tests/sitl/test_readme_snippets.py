@@ -39,6 +39,7 @@ SHORTER = {
     "fly": ["--duration", "1", "--viewer", "none", "--mavlink", "none", "--pack", "auto"],
     "verify": ["--case", "flight"],
     "study": ["--duration", "1", "--seeds", "1", "--jobs", "1"],
+    "map": ["--duration", "1", "--jobs", "1", "--x", "faults.0.effectiveness=0.5:1:2", "--y", "faults.0.bias=0:0.1:2"],
 }
 """What is added to commands, so that they end soon and open nothing; of an option given twice the last one counts."""
 
@@ -199,7 +200,7 @@ def arguments_of(command: str) -> list[str]:
     """What is typed for a command of a page."""
     words = shlex.split(meant(command))[1:]
     more = SHORTER.get(words[0], [])
-    out = ["--out", f"out/{next(_OUT)}"] if words[0] in ("simulate", "fly", "study") else []
+    out = ["--out", f"out/{next(_OUT)}"] if words[0] in ("simulate", "fly", "study", "map") else []
     return [*words, *more, *out]
 
 
