@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ftcc.airside.scheme import quantities
-from ftcc.groundside.studies.figures import save
 from ftcc.groundside.studies.map import Axis, Map
 from ftcc.link.actuators import unit_of
 
@@ -23,7 +22,7 @@ _MOST_CURVES = 6
 
 def draw_map(flown: Map, folder: Path) -> list[Path]:
     """Draw a map as PNG, SVG and PDF into ``folder``, and return the files."""
-    from ftcc.groundside.canvas import Line2D, plt
+    from ftcc.groundside.canvas import STYLE, Line2D, plt, save
 
     figure, axes = plt.subplots(figsize=(6.4, 5.6), layout="constrained")
     x, y = np.array(flown.x.values), np.array(flown.y.values)
@@ -61,7 +60,8 @@ def draw_map(flown: Map, folder: Path) -> list[Path]:
     axes.set_title(f"{flown.plan.title}\n{flown.plan.case}", fontsize="small", wrap=True)
     if handles:
         figure.legend(handles=handles, loc="outside lower center", fontsize="small", frameon=False)
-    return save(figure, folder, "map")
+    with plt.rc_context(STYLE):
+        return list(save(figure, "map", f"Where the claim holds: {flown.question}.", "", folder).files)
 
 
 def _size(x: Any, y: Any) -> float:
