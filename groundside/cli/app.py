@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, study, swarms, view
+from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, search, study, swarms, view
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.cli.examples import EXAMPLES
 from ftcc.groundside.cli.map import map_
@@ -34,6 +34,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         scenarios.verify,
         study.study,
         map_,
+        search.search,
         airframe.airframe,
     ),
     "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),

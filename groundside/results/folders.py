@@ -85,8 +85,8 @@ def _lock(folder: Path) -> int:
     return descriptor
 
 
-_RESULT_FILES = ("scenario.toml", "study.toml", "study.parquet")
-"""A folder with one of these files contains a run or a study."""
+_RESULT_FILES = ("scenario.toml", "study.toml", "study.parquet", "search.toml")
+"""A folder with one of these files contains a run, a study or a search."""
 
 
 def new_folder(name: str, out: str | Path | None = None, kind: str = "runs") -> Path:

@@ -30,3 +30,10 @@ from .rows import table_of as table_of
 from .summary import show as show
 from .summary import summary as summary
 from .summary import summary_of_sensitivities as summary_of_sensitivities
+from .search import Flown as Flown
+from .search import SearchPlan as SearchPlan
+from .search import plan_search as plan_search
+from .search_figure import draw_search as draw_search
+from .search_record import open_search_folder as open_search_folder
+from .searching import Found as Found
+from .searching import fly_search as fly_search

@@ -1,0 +1,200 @@
+"""The folder of a search: its plan as ``search.toml``, its flights as they land, and as one table in the end."""
+
+from __future__ import annotations
+
+import time
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tomli_w
+
+from ftcc.groundside.results import lock_until_exit, new_folder
+from ftcc.groundside.studies.errors import StudyError
+from ftcc.groundside.studies.flying import Outcome
+from ftcc.groundside.studies.rows import table_of
+from ftcc.groundside.studies.search import GENERATION, Flown, SearchPlan
+from ftcc.groundside.studies.versions import versions
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+__all__ = ["TABLE", "Record", "open_search_folder"]
+
+TABLE = "search.parquet"
+_PLAN = "search.toml"
+_FLIGHTS = "flights"
+_APPEND = 2.0
+"""Wall time between two files of flights of one generation, s."""
+
+
+def open_search_folder(search: SearchPlan, out: str | Path | None, resume: bool = False) -> Path:
+    """Return the folder of a search, created or, with ``resume``, the one where it was begun.
+
+    Raises
+    ------
+    StudyError
+        If there is nothing to go on with, or another search.
+    RunError
+        If the folder cannot be written or is taken.
+    """
+    text = tomli_w.dumps(_document(search))
+    if not resume:
+        place = new_folder(search.study.name, out, "studies")
+        (place / _PLAN).write_text(text, encoding="utf-8")
+        return place
+    if out is None or not (Path(out) / _PLAN).is_file():
+        raise StudyError(f"--resume: {out or 'no folder given with --out'}: holds no search to go on with")
+    place = Path(out)
+    try:
+        there = tomllib.loads((place / _PLAN).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"{place / _PLAN}: damaged: {error}") from None
+    here = tomllib.loads(text)
+    if differing := [key for key in here if here[key] != there.get(key)]:
+        raise StudyError(
+            f"{place}: holds another search: {', '.join(differing)} differ; give another folder with --out"
+        )
+    lock_until_exit(place)
+    return place
+
+
+def _document(search: SearchPlan) -> dict[str, Any]:
+    """Return everything that determines the flights."""
+    study = search.study
+    return {
+        "claim": search.goal,
+        "budget": search.budget,
+        "method": search.method,
+        "generation": GENERATION,
+        "seed": search.draws.seed,
+        "over": {one.key: one.distribution.text for one in search.quantities},
+        "own": {one.key: own for one, own in zip(search.quantities, search.draws.own, strict=True)},
+        "versions": versions(),
+        "name": study.name,
+        "case": study.case,
+        "settings": list(study.settings),
+        "claims": [claim.model_dump(by_alias=True, exclude_none=True) for claim in study.claims],
+        "files": dict(study.files),
+        "scenario": study.documents[0][1],
+    }
+
+
+class Record:
+    """The flights of a search on disk."""
+
+    def __init__(self, search: SearchPlan, folder: Path) -> None:
+        self._search = search
+        self._folder = folder
+        self._parts = folder / _FLIGHTS
+        self._parts.mkdir(exist_ok=True)
+        for left in self._parts.glob("*.unfinished"):
+            left.unlink()
+        self._next = max((int(path.stem) for path in self._parts.glob("*.parquet")), default=-1) + 1
+        self._pending: list[Flown] = []
+        self._written = time.monotonic()
+
+    def add(self, flights: Sequence[Flown]) -> None:
+        """Take note of flights; they are written now and then."""
+        self._pending += flights
+        if time.monotonic() - self._written > _APPEND:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has landed since the last time."""
+        self._written = time.monotonic()
+        if self._pending:
+            self._write(self._parts / f"{self._next:06d}.parquet", self.table(self._pending))
+            self._next += 1
+            self._pending = []
+
+    def write(self, flights: Sequence[Flown]) -> Path:
+        """Write ``search.parquet``, all flights by number, and return its path."""
+        path = self._folder / TABLE
+        self._write(path, self.table(flights))
+        return path
+
+    def read(self) -> dict[int, dict[str, Any]]:
+        """Return the rows of all flights that have landed, by number."""
+        import pyarrow.parquet as pq
+
+        paths = sorted(self._parts.glob("*.parquet"))
+        return {row["flight"]: row for path in paths for row in pq.read_table(path).to_pylist()}
+
+    def table(self, flights: Sequence[Flown]) -> pa.Table:
+        """Return flights as a table: the columns of a study, and what the search made of each."""
+        import pyarrow as pa
+
+        ordered = sorted(flights, key=lambda one: one.number)
+        table = table_of(self._search.study, [one.outcome for one in ordered])
+        lists = pa.list_(pa.float64())
+        for name, kind, meaning in (
+            (
+                "stage",
+                pa.string(),
+                "own: the scenario's values; search; line: between its mildest failing flight and them",
+            ),
+            ("point", lists, "asked for, in the unit cube of the distribution functions"),
+            ("distance", pa.float64(), "from the scenario's own values, in units of the distributions"),
+            ("margin", pa.float64(), f"of '{self._search.goal}', as a share of what it allows; null: it has no value"),
+            ("fails", pa.bool_(), "null: it cannot be said"),
+            ("objective", pa.float64(), "what the search makes small"),
+            ("end margin", pa.float64(), "smallest 1 - end/allowed of the tracking errors"),
+        ):
+            column: list[Any] = [
+                one.outcome.end_margin if name == "end margin" else getattr(one, name) for one in ordered
+            ]
+            field = pa.field(name, kind, metadata={"meaning": meaning})
+            table = table.append_column(field, pa.array(column, kind))
+        return table
+
+    def flown(self, row: dict[str, Any], stage: str, point: Sequence[float], values: Sequence[Any]) -> Flown:
+        """Return a flight from its row.
+
+        Raises
+        ------
+        StudyError
+            If the row is of another point.
+        """
+        if row["stage"] != stage or tuple(row["point"]) != tuple(point):
+            raise StudyError(
+                f"{self._folder}: flight {row['flight']} is not the one that this search flies; it is damaged"
+            )
+        outcome = self._outcome(row, values)
+        return Flown(
+            row["flight"], stage, tuple(point), tuple(values), row["distance"], row["margin"], row["fails"],
+            row["objective"], outcome,
+        )  # fmt: skip
+
+    def _outcome(self, row: dict[str, Any], values: Sequence[Any]) -> Outcome:
+        from ftcc.groundside.studies.measures import measures_of, titles_of
+
+        study, found, holds = self._search.study, [], []
+        for place, title in enumerate(titles_of(study.claims)):
+            measures = [one for one in measures_of(study) if one.place == place]
+            numbers = [row[one.name] for one in measures]
+            single = measures[0].part is None
+            found.append(numbers[0] if single else None if None in numbers else numbers)
+            holds.append(row[f"{title} holds"])
+        flew = row["verdict"] is not None
+        return Outcome(
+            row["flight"],
+            tuple(values),
+            tuple(found) if flew else (),
+            tuple(holds) if flew else (),
+            tuple(row["lost"] or ()),
+            row["verdict"],
+            row.get("largest error"),
+            end_margin=row["end margin"],
+            refused=row["refused"],
+            error=row["error"] or "",
+        )
+
+    @staticmethod
+    def _write(path: Path, table: pa.Table) -> None:
+        import pyarrow.parquet as pq
+
+        unfinished = path.with_suffix(".unfinished")
+        pq.write_table(table, unfinished)
+        unfinished.replace(path)
