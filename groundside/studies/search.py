@@ -7,16 +7,13 @@ The mildest flight that failed is then brought back towards the scenario's own v
 from __future__ import annotations
 
 import functools
-import importlib.util
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ftcc.groundside.scenario import resolve
-from ftcc.groundside.statistics import Design
 from ftcc.groundside.studies.distance import distance, own_value, place_of, values_at
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
@@ -24,6 +21,7 @@ from ftcc.groundside.studies.given import GivenDraws
 from ftcc.groundside.studies.measures import measures_of, titles_of
 from ftcc.groundside.studies.plan import StudyPlan, plan_study
 from ftcc.groundside.studies.quantities import RandomQuantity, quantity_of
+from ftcc.groundside.studies.search_sampler import GENERATION, Sampler, optuna_for
 from ftcc.groundside.verdict import FAILED
 
 __all__ = [
@@ -42,10 +40,6 @@ METHODS = ("cmaes", "tpe")
 VERDICT = "verdict is not failed"
 """What is held against a flight where no claim is named."""
 NOBODY_LOST = "nobody lost"
-GENERATION = 12
-"""Flights that are asked for together, whatever the number of workers."""
-_SIGMA = 0.25
-"""Standard deviation of the first generation of CMA-ES, as a share of each quantity's flights."""
 _REPELLED = 1e7
 """Objective of a flight that cannot be judged, to which its distance is added: worse than any that can."""
 _LARGEST_MARGIN = 1e6
@@ -203,7 +197,7 @@ def plan_search(
             (value,) = values_at(quantities[place : place + 1], [edge])
             study.scenario(0, (*own[:place], value, *own[place + 1 :]), study.draws.seed)
     chosen = method or ("tpe" if len(quantities) == 1 else "cmaes")
-    _optuna(chosen)
+    optuna_for(chosen)
     return SearchPlan(study, goal, stated, budget, chosen)
 
 
@@ -255,82 +249,6 @@ def _own_values(declared: StudyPlan, quantities: Sequence[RandomQuantity]) -> tu
     return tuple(value for value, _ in found), tuple(stated for _, stated in found)
 
 
-def _installed(name: str) -> bool:
-    try:
-        return importlib.util.find_spec(name) is not None
-    except ValueError:  # a module without a specification, or one that was put out of reach
-        return False
-
-
-def _optuna(method: str) -> Any:
-    """Return Optuna.
-
-    Raises
-    ------
-    StudyError
-        If it, or CMA-ES, is not installed.
-    """
-    missing = [name for name in ("optuna", *(("cmaes",) if method == "cmaes" else ())) if not _installed(name)]
-    if missing:
-        needs = " and ".join(missing)
-        raise StudyError(f'ftcc search: needs {needs}; install it with: pip install "ftcc-sitl[search]"')
-    import optuna
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    return optuna
-
-
-class _Sampler:
-    """Asks for generations of points in the unit cube, and is told their objectives in the same order.
-
-    The first generation fills the cube evenly; from the best of it, or from the scenario's own values, Optuna goes on.
-    """
-
-    def __init__(self, search: SearchPlan, own: float) -> None:
-        self._optuna = _optuna(search.method)
-        self._method = search.method
-        self._seed = search.draws.seed % 2**32
-        self._design = Design("sobol", len(search.quantities), self._seed, GENERATION)
-        self._keys = [f"{n}" for n in range(len(search.quantities))]
-        self._space = {key: self._optuna.distributions.FloatDistribution(0.0, 1.0) for key in self._keys}
-        self._first = [(own, search.own_point)]
-        self._study: Any = None
-        self._trials: list[Any] = []
-
-    def ask(self, count: int) -> list[tuple[float, ...]]:
-        """Return the points of the next flights."""
-        if self._study is None:
-            return [tuple(point) for point in self._design.points(0, count).tolist()]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            self._trials = [self._study.ask(self._space) for _ in range(count)]
-        return [tuple(trial.params[key] for key in self._keys) for trial in self._trials]
-
-    def tell(self, generation: Sequence[Flown]) -> None:
-        """Take note of the flights that were asked for last."""
-        if self._study is None:
-            self._first += [(one.objective, one.point) for one in generation]
-            self._begin()
-            return
-        for trial, one in zip(self._trials, generation, strict=True):
-            self._study.tell(trial, one.objective)
-
-    def _begin(self) -> None:
-        samplers = self._optuna.samplers
-        best = dict(zip(self._keys, min(self._first)[1], strict=True))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that a feature is experimental: the tests hold it to its results
-            if self._method == "cmaes":
-                sampler = samplers.CmaEsSampler(x0=best, sigma0=_SIGMA, popsize=GENERATION, seed=self._seed)
-            else:
-                sampler = samplers.TPESampler(seed=self._seed, multivariate=True, n_startup_trials=1)
-            self._study = self._optuna.create_study(sampler=sampler)
-        for objective, point in self._first:
-            params = dict(zip(self._keys, point, strict=True))
-            trial = self._optuna.trial.create_trial(params=params, distributions=self._space, value=objective)
-            self._study.add_trial(trial)
-
-
 Fly = Callable[[int, str, Sequence[tuple[float, ...]], Sequence[tuple[Any, ...]]], list[Flown]]
 """Number of the first flight, stage, points and values: returns the flights in their order."""
 
@@ -349,11 +267,11 @@ def flights_of(search: SearchPlan, fly: Fly) -> tuple[list[Flown], float | None]
         raise StudyError(f"the scenario's own flight cannot be judged: {why}")
     if flights[0].fails:
         return flights, None
-    sampler = _Sampler(search, flights[0].objective)
+    sampler = Sampler(search.method, search.own_point, search.draws.seed, flights[0].objective)
     while len(flights) < search.budget:
         points = sampler.ask(min(GENERATION, search.budget - len(flights)))
         generation = fly(len(flights), "search", points, [values_at(search.quantities, point) for point in points])
-        sampler.tell(generation)
+        sampler.tell([one.objective for one in generation])
         flights += generation
     failing = [one for one in flights if one.fails]
     if not failing:

@@ -14,7 +14,8 @@ from ftcc.groundside.results import lock_until_exit, new_folder
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.rows import table_of
-from ftcc.groundside.studies.search import GENERATION, Flown, SearchPlan
+from ftcc.groundside.studies.search import Flown, SearchPlan
+from ftcc.groundside.studies.search_sampler import GENERATION
 from ftcc.groundside.studies.versions import versions
 
 if TYPE_CHECKING:

@@ -13,8 +13,9 @@ from ftcc.groundside.statistics import upper_bound
 from ftcc.groundside.studies.campaign import _engine
 from ftcc.groundside.studies.engine import Engine, catch_ctrl_c, fly_all
 from ftcc.groundside.studies.flying import Outcome
-from ftcc.groundside.studies.search import GENERATION, Flown, SearchPlan, flights_of, toml_of
+from ftcc.groundside.studies.search import Flown, SearchPlan, flights_of, toml_of
 from ftcc.groundside.studies.search_record import Record
+from ftcc.groundside.studies.search_sampler import GENERATION
 
 __all__ = ["WORST", "Found", "fly_search"]
 

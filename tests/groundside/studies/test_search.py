@@ -23,8 +23,9 @@ from ftcc.groundside.studies.distance import distance, place_of
 from ftcc.groundside.studies.engine import Engine
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.quantities import quantity_of
-from ftcc.groundside.studies.search import GENERATION, NOBODY_LOST, SearchPlan, plan_search
+from ftcc.groundside.studies.search import NOBODY_LOST, SearchPlan, plan_search
 from ftcc.groundside.studies.search_record import open_search_folder
+from ftcc.groundside.studies.search_sampler import GENERATION
 from ftcc.groundside.studies.searching import Found, fly_search
 
 HULL = "distance outside the leaders' hull"
