@@ -116,8 +116,7 @@ def study(
 
 def _planned(scenario: str, options: dict[str, Any], open_end: bool) -> StudyPlan:
     """The study that the options ask for."""
-    from ftcc.groundside.studies import is_study, plan_study
-    from ftcc.groundside.studies.campaign import WITHOUT_END
+    from ftcc.groundside.studies import WITHOUT_END, is_study, plan_study
 
     if is_study(scenario):
         fail(f"{scenario}: is a study already; to go on with it: ftcc study {scenario} --resume")

@@ -49,4 +49,6 @@ class StudyFields(Strict):
     design: Literal["sobol", "lhs", "random"] = Field("sobol", description="how the draws fill their space")
     redraw: bool = Field(False, description="true: a draw that cannot fly is drawn again; false: it is a row")
     seed: int | None = Field(None, ge=0, description="of the draws and the first flight; default: the scenario's")
-    claims: list[StudyClaim] = Field([], description="what every flight is held to; default: the claims of the scenario's case")
+    claims: list[StudyClaim] = Field(
+        [], description="what every flight is held to; default: the claims of the scenario's case"
+    )

@@ -31,7 +31,7 @@ class Place(NamedTuple):
     """Where a column stands in a whole recording."""
 
     part: str
-    index: int
+    number: int
 
 
 def places_of(mission: Mission) -> dict[str, Place]:
@@ -64,7 +64,7 @@ def places_kept(mission: Mission, columns: Collection[str] | None) -> dict[str, 
     if unknown := sorted(wanted - set(places)):
         raise UserError(f"columns: there is no column {', '.join(unknown)}; there are {', '.join(places)}")
     kept = {places[name] for name in wanted} | {Place("truth", 0)}
-    return {part: sorted(place.index for place in kept if place.part == part) for part in PARTS}
+    return {part: sorted(place.number for place in kept if place.part == part) for part in PARTS}
 
 
 def columns_needed(mission: Mission) -> frozenset[str]:

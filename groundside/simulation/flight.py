@@ -75,9 +75,9 @@ class Flight(Recording):
         """The recorded columns (n, k)."""
         kept = places_kept(self.mission, self.columns)
         return {
-            name: getattr(self, place.part)[:, :, kept[place.part].index(place.index)]
+            name: getattr(self, place.part)[:, :, kept[place.part].index(place.number)]
             for name, place in places_of(self.mission).items()
-            if place.index in kept[place.part]
+            if place.number in kept[place.part]
         }
 
     def _values(self, name: str) -> NDArray[np.float64]:

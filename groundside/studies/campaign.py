@@ -16,7 +16,8 @@ from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.folder import check_same, is_study, load_plan, save_plan
 from ftcc.groundside.studies.measures import titles_of
-from ftcc.groundside.studies.plan import StudyPlan, plan_study
+from ftcc.groundside.studies.plan import StudyPlan
+from ftcc.groundside.studies.planning import plan_study
 from ftcc.groundside.studies.results import Study
 from ftcc.groundside.studies.rows import Dataset, write_table
 from ftcc.groundside.verdict import FAILED
@@ -140,7 +141,9 @@ def fly_study(
         False if Ctrl-C interrupted it: `open_folder` with ``resume`` goes on.
     """
     if cluster is not None and record:
-        raise StudyError("--record: workers of a cluster may have no folder in common; record single flights with --row")
+        raise StudyError(
+            "--record: workers of a cluster may have no folder in common; record single flights with --row"
+        )
     dataset = Dataset(plan, folder)
     flight = _Landed(plan, dataset, until, report)
     complete = False

@@ -56,7 +56,7 @@ class Cluster(Engine):
     def workers(self) -> int:  # type: ignore[override]
         """Number of threads of all usable workers, at least 1: others may come."""
         there = self._there()
-        return max(1, sum(there[one]["nthreads"] for one in self._usable()))
+        return max(1, sum(int(there[one]["nthreads"]) for one in self._usable()))
 
     def submit(self, plan: bytes, numbers: Sequence[int]) -> Future[list[Outcome]]:
         return self._executor().submit(fly_batch, plan, numbers, versions())

@@ -134,9 +134,7 @@ def local_engine(jobs: int, flights: int, record_in: Path | None = None) -> Engi
             return Pool(jobs, multiprocessing.get_context("spawn").Event(), record_in)
         except (OSError, ImportError) as error:
             why = getattr(error, "strerror", None) or error
-            text = (
-                f"cannot use several processes ({why}; their semaphores need /dev/shm): all flights run in this one"
-            )
+            text = f"cannot use several processes ({why}; their semaphores need /dev/shm): all flights run in this one"
             warnings.warn(text, RuntimeWarning, stacklevel=3)
     return Here(record_in)
 

@@ -1,4 +1,4 @@
-"""The folder of a study: its plan as ``study.toml``, from which it goes on, and from which each flight can be repeated."""
+"""The folder of a study: its plan as ``study.toml``, from which it goes on and each flight can be repeated."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ def load_plan(folder: str | Path, same_version: bool = True) -> StudyPlan:
     except (KeyError, TypeError, ValueError) as error:
         raise StudyError(f"{path}: damaged, or of another version of the program: {error!r}") from None
     if same_version and (wrong := difference(document["versions"])):
-        raise StudyError(f"{path}: was begun by another version of the program ({wrong}); it can only go on with that one")
+        raise StudyError(
+            f"{path}: was begun by another version of the program ({wrong}); it can only go on with that one"
+        )
     return plan
 
 
@@ -69,7 +71,9 @@ def check_same(plan: StudyPlan, folder: Path) -> None:
     there = tomllib.loads(tomli_w.dumps(there))
     differing = [key for key in here if key not in _OF_ONE_RUN and here[key] != there.get(key)]
     if differing:
-        raise StudyError(f"{folder}: holds another study: {', '.join(differing)} differ; give another folder with --out")
+        raise StudyError(
+            f"{folder}: holds another study: {', '.join(differing)} differ; give another folder with --out"
+        )
 
 
 def _document(plan: StudyPlan) -> dict[str, Any]:
@@ -89,7 +93,10 @@ def _document(plan: StudyPlan) -> dict[str, Any]:
         "redraw": plan.redraw,
         "versions": versions(),
         "vary": [{"key": one.key, "values": list(one.values)} for one in plan.varied],
-        "random": [{"key": one.key, "distribution": one.distribution.name, **one.distribution.parameters} for one in draws.quantities],
+        "random": [
+            {"key": one.key, "distribution": one.distribution.name, **one.distribution.parameters}
+            for one in draws.quantities
+        ],
         "claims": [claim.model_dump(by_alias=True, exclude_none=True) for claim in plan.claims],
         "files": dict(plan.files),
         "case": [{"name": case, "scenario": scenario} for case, scenario in plan.documents],

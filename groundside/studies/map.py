@@ -17,7 +17,8 @@ from ftcc.groundside.scenario import ScenarioError, resolve, trims_under_faults
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.folder import load_plan
 from ftcc.groundside.studies.measures import Measure, measures_of, titles_of
-from ftcc.groundside.studies.plan import StudyPlan, plan_study
+from ftcc.groundside.studies.plan import StudyPlan
+from ftcc.groundside.studies.planning import plan_study
 from ftcc.groundside.studies.results import Study
 
 if TYPE_CHECKING:

@@ -257,7 +257,7 @@ def _failed(answers: Answers, folder: Path) -> Section:
         what = [*failing, *([columns["error"][at]] if columns["error"][at] else [])]
         rows.append([number, _label(answers, n), *drawn, columns["seed"][at], _bad("; ".join(what)), command])
     before = [
-        f"{len(numbers)} flights in which not all holds; each command repeats one, bit for bit, with the versions below."
+        f"{len(numbers)} flights in which not all holds; each command repeats one, bit for bit, by the versions below."
     ]
     if len(numbers) > _LISTED:
         before.append(f"The first {_LISTED} are listed; study.parquet contains all.")

@@ -41,7 +41,9 @@ def quantities_in(table: Mapping[str, Any], where: str = "study.random") -> Iter
     for key, value in table.items():
         here = f"{where}.{key}"
         if not isinstance(value, Mapping):
-            raise StudyError(f'{here} = {value!r}: must be {{ distribution = "uniform", low = 0, high = 1 }} or the like')
+            raise StudyError(
+                f'{here} = {value!r}: must be {{ distribution = "uniform", low = 0, high = 1 }} or the like'
+            )
         if isinstance(value.get("distribution"), str):
             yield RandomQuantity(here.removeprefix("study.random."), distribution_of(value, here))
         else:
@@ -57,7 +59,9 @@ def quantity_of(text: str, option: str = "--random") -> RandomQuantity:
     """
     key, equals, given = text.partition("=")
     if not equals or not key.strip() or not given.strip():
-        raise StudyError(f"{option} {text}: must be key.path=distribution(...), such as channel.loss=uniform(low=0, high=0.6)")
+        raise StudyError(
+            f"{option} {text}: must be key.path=distribution(...), such as channel.loss=uniform(low=0, high=0.6)"
+        )
     return RandomQuantity(key.strip(), distribution_of(given.strip(), f"{option} {key.strip()}"))
 
 

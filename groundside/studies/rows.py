@@ -84,7 +84,9 @@ def table_of(plan: StudyPlan, outcomes: Iterable[Outcome]) -> pa.Table:
     rows = [_row(plan, outcome) for outcome in ordered]
     schema = schema_of(plan)
     columns = zip(*rows, strict=True) if rows else [()] * len(schema)
-    arrays = [pa.array(_converted(column, field.type), field.type) for column, field in zip(columns, schema, strict=True)]
+    arrays = [
+        pa.array(_converted(column, field.type), field.type) for column, field in zip(columns, schema, strict=True)
+    ]
     return pa.Table.from_arrays(arrays, schema=schema)
 
 

@@ -19,7 +19,8 @@ from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.given import GivenDraws
 from ftcc.groundside.studies.measures import measures_of, titles_of
-from ftcc.groundside.studies.plan import StudyPlan, plan_study
+from ftcc.groundside.studies.plan import StudyPlan
+from ftcc.groundside.studies.planning import plan_study
 from ftcc.groundside.studies.quantities import RandomQuantity, quantity_of
 from ftcc.groundside.studies.search_sampler import GENERATION, Sampler, optuna_for
 from ftcc.groundside.verdict import FAILED
