@@ -141,11 +141,8 @@ class Record:
             ("margin", pa.float64(), f"of '{self._search.goal}', as a share of what it allows; null: it has no value"),
             ("fails", pa.bool_(), "null: it cannot be said"),
             ("objective", pa.float64(), "what the search makes small"),
-            ("end margin", pa.float64(), "smallest 1 - end/allowed of the tracking errors"),
         ):
-            column: list[Any] = [
-                one.outcome.end_margin if name == "end margin" else getattr(one, name) for one in ordered
-            ]
+            column = [getattr(one, name) for one in ordered]
             field = pa.field(name, kind, metadata={"meaning": meaning})
             table = table.append_column(field, pa.array(column, kind))
         return table
@@ -187,7 +184,7 @@ class Record:
             tuple(row["lost"] or ()),
             row["verdict"],
             row.get("largest error"),
-            end_margin=row["end margin"],
+            end_margin=row.get("end margin"),
             refused=row["refused"],
             error=row["error"] or "",
         )

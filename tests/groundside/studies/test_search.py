@@ -281,5 +281,7 @@ def test_a_search_of_real_flights_ends_with_the_flight_that_breaks_the_claim(sho
     worst = found.failing[0]
     assert result.ok is False
     assert result.value == worst.outcome.values[0]
-    row = pq.read_table(tmp_path / "one" / "search.parquet").to_pylist()[worst.number]
+    table = pq.read_table(tmp_path / "one" / "search.parquet")
+    assert len(set(table.column_names)) == table.num_columns
+    row = table.to_pylist()[worst.number]
     assert (row["tracking"], row["faults.0.bias"], row["distance"]) == (result.value, worst.values[0], worst.distance)
