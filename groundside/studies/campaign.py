@@ -25,7 +25,7 @@ from ftcc.groundside.verdict import FAILED
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["WITHOUT_END", "Progress", "fly_study", "larger", "open_folder", "study"]
+__all__ = ["WITHOUT_END", "Progress", "engine_for", "fly_study", "larger", "open_folder", "study"]
 
 _APPEND = 2.0
 """Wall time between two files of the dataset, s."""
@@ -151,7 +151,7 @@ def fly_study(
         engine: Engine | None = None
         try:
             with catch_ctrl_c() as raise_if_interrupted:
-                engine = _engine(plan, jobs, cluster, folder if record else None, flight.missing)
+                engine = engine_for(plan, jobs, cluster, folder if record else None, flight.missing)
                 engine.prepare(plan)
                 raise_if_interrupted()
                 flight.begin()
@@ -177,7 +177,8 @@ def _rows_before(table: pa.Table, number: int) -> int:
     return int(np.searchsorted(table.column("flight").to_numpy(), number))
 
 
-def _engine(plan: StudyPlan, jobs: int | None, cluster: str | None, record_in: Path | None, flights: int) -> Engine:
+def engine_for(plan: StudyPlan, jobs: int | None, cluster: str | None, record_in: Path | None, flights: int) -> Engine:
+    """Return the cluster at this address, or else so many processes, one per core by default."""
     if cluster is not None:
         from ftcc.groundside.studies.cluster import Cluster
 

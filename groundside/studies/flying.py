@@ -38,7 +38,7 @@ class Outcome:
     largest: float | None = None
     """Largest value of the scheme's first tracking error."""
     end_margin: float | None = None
-    """1 - end / allowed of the scheme's first tracking error, see ``verdict``; None: no such error, or none allowed."""
+    """Smallest 1 - end / allowed of the scheme's tracking errors, see ``verdict``; None: none is limited."""
     refused: bool = False
     """Whether the checks of scenarios refused it."""
     error: str = ""
@@ -138,8 +138,9 @@ def _flown(
 
 
 def _end_margin(verdict: Verdict) -> float | None:
-    error = verdict.tracking[0] if verdict.tracking else None
-    return None if error is None or error.end is None or not error.allowed else 1.0 - error.end / error.allowed
+    """Return the smallest 1 - end/allowed of the scheme's tracking errors; None if none is limited."""
+    margins = [1.0 - one.end / one.allowed for one in verdict.tracking if one.end is not None and one.allowed]
+    return min(margins, default=None)
 
 
 def _holds(result: Any, own_case: bool) -> bool | None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["END", "Axis", "Curve", "Map", "axis_of", "check_claim", "plan_map"]
 
 END = "tracking error at the end"
-"""The question of a map without a claim: the verdict's first tracking error against what the verdict allows."""
+"""The question of a map without a claim: the verdict's tracking errors against what the verdict allows."""
 _FINE = 200
 """Points along each axis of a curve that needs no flight plan per point."""
 _MOST_CELLS = 100_000

@@ -52,7 +52,7 @@ def schema_of(plan: StudyPlan) -> pa.Schema:
     if tracked:
         about = {"unit": tracked[0].unit, "meaning": f"largest of all UAVs, abs({tracked[0].name})"}
         fields.append(pa.field("largest error", pa.float64(), metadata=about))
-        about = {"unit": "-", "meaning": f"1 - end / allowed of abs({tracked[0].name}), as in the verdict"}
+        about = {"unit": "-", "meaning": "smallest 1 - end / allowed of all tracking errors, as in the verdict"}
         fields.append(pa.field("end margin", pa.float64(), metadata=about))
     fields += [
         pa.field("verdict", pa.string(), metadata={"meaning": "how the flight went"}),
@@ -75,8 +75,8 @@ def table_of(plan: StudyPlan, outcomes: Iterable[Outcome]) -> pa.Table:
     """Return flights as a ``pyarrow.Table``, one row per flight, by number.
 
     Columns: ``flight``, the varied keys, ``draw``, the drawn keys, ``seed``; for each claim its value under the claim's
-    name, and ``NAME holds``; ``largest error`` and ``end margin`` (of the scheme's first tracking error), ``verdict``,
-    ``lost`` (ids), ``refused``, ``error`` (text). Null: not flown, or no such number.
+    name, and ``NAME holds``; ``largest error`` (of the scheme's first tracking error), ``end margin`` (smallest of
+    all), ``verdict``, ``lost`` (ids), ``refused``, ``error`` (text). Null: not flown, or no such number.
     """
     import pyarrow as pa
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ftcc.groundside.statistics import upper_bound
-from ftcc.groundside.studies.campaign import _engine
+from ftcc.groundside.studies.campaign import engine_for
 from ftcc.groundside.studies.engine import Engine, catch_ctrl_c, fly_all
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.search import Flown, SearchPlan, flights_of, toml_of
@@ -138,7 +138,7 @@ def fly_search(
     flight = _Flight(search, record, report)
     try:
         with catch_ctrl_c() as raise_if_interrupted:
-            flight.engine = engine or _engine(search.study, jobs, cluster, None, GENERATION)
+            flight.engine = engine or engine_for(search.study, jobs, cluster, None, GENERATION)
             flight.engine.prepare(search.study)
             flight.raise_if_interrupted = raise_if_interrupted
             raise_if_interrupted()
