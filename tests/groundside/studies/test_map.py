@@ -128,7 +128,7 @@ def test_equal_maps_have_equal_pictures(planned: Any, tmp_path: Path) -> None:
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         names = [path.name for path in draw_map(flown, tmp_path / folder)]
-    assert names == ["map.png", "map.svg", "map.pdf"]
+    assert names == ["map.svg", "map.pdf", "map.png"]
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
