@@ -180,9 +180,13 @@ class Answers:
                 f"{self._subject(n)} in {percent(other)} of {other.of}; {self._subject(0)} holds {_points(pairs)} more "
                 f"often on the same {both} draws (exact McNemar test: p = {pairs.p:.2g})"
             )
-        for n, label in enumerate(self.labels[:9]):
-            if refused := int(self.refused[:, n].sum()):
-                lines.append(f"{refused} draws cannot fly and are not counted{f' ({label})' if label else ''}")
+        refused = {n: int(count) for n, count in enumerate(self.refused.sum(axis=0)[:9]) if count}
+        if len(set(refused.values())) == 1 and len(refused) == min(len(self.labels), 9):
+            lines.append(f"{refused[0]} of {self.draws} draws cannot fly and are not counted")
+        else:
+            lines += [
+                f"{count} draws cannot fly and are not counted ({self.labels[n]})" for n, count in refused.items()
+            ]
         return lines
 
     def _subject(self, combination: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,7 +18,6 @@ import pytest
 from ftcc.groundside.studies import fly_study, open_folder, plan_study
 from ftcc.groundside.studies.campaign import Progress
 from tests.groundside.studies.test_random_studies import scenario_in
-from tests.support.swarm import free_ports
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +48,9 @@ class Started:
 @pytest.fixture
 def scheduler() -> Iterator[str]:
     distributed = pytest.importorskip("distributed")
-    (port,) = free_ports(1)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
     with Started("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"):
         address = f"tcp://127.0.0.1:{port}"
         until = time.monotonic() + 60.0
