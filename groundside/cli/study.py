@@ -93,6 +93,8 @@ def study(
         "seed": seed,
         "duration": duration,
     }
+    if resume and out is None and not is_study(scenario):
+        fail(f"--resume: {scenario}: holds no study to go on with")
     if resume and is_study(scenario):
         planned, out = _resumed(Path(scenario), options), Path(scenario)
     else:
