@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import json
 from collections.abc import Iterable, Sequence
@@ -17,6 +16,7 @@ import numpy as np
 
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.measures import Measure, measures_of, titles_of
+from ftcc.groundside.studies.parts import Parts, write_parquet
 from ftcc.groundside.studies.plan import StudyPlan
 from ftcc.groundside.studies.versions import versions
 
@@ -27,7 +27,6 @@ __all__ = ["SCHEMA_VERSION", "Dataset", "kind_of", "table_of", "write_table"]
 
 SCHEMA_VERSION = 3
 """Version of the columns of ``study.parquet``."""
-_FLIGHTS = "flights"
 _TABLE = "study.parquet"
 _WALL = "wall"
 
@@ -143,64 +142,32 @@ class Dataset:
 
     def __init__(self, plan: StudyPlan, folder: Path) -> None:
         self.plan = plan
-        self.folder = folder / _FLIGHTS
-        self.folder.mkdir(parents=True, exist_ok=True)
-        for left in self.folder.glob("*.unfinished"):
-            left.unlink()
-        parts = [int(path.stem) for path in self.folder.glob("*.parquet")]
-        self._next = max(parts, default=-1) + 1
+        self._parts = Parts(folder)
 
     def append(self, outcomes: Sequence[Outcome]) -> None:
         """Write rows into a file of their own, which appears when it is whole."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        if not outcomes:
-            return
-        ordered = sorted(outcomes, key=lambda outcome: outcome.number)
-        walls = pa.array([outcome.wall for outcome in ordered], pa.float64())
-        field = pa.field(_WALL, pa.float64(), metadata={"unit": "s", "meaning": "wall time of the flight"})
-        table = table_of(self.plan, ordered).append_column(field, walls)
-        path = self.folder / f"{self._next:06d}.parquet"
-        unfinished = path.with_suffix(".unfinished")
-        try:
-            pq.write_table(table, unfinished)
-            unfinished.replace(path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                unfinished.unlink(missing_ok=True)
-            raise
-        self._next += 1
+        if outcomes:
+            ordered = sorted(outcomes, key=lambda outcome: outcome.number)
+            walls = pa.array([outcome.wall for outcome in ordered], pa.float64())
+            field = pa.field(_WALL, pa.float64(), metadata={"unit": "s", "meaning": "wall time of the flight"})
+            self._parts.append(table_of(self.plan, ordered).append_column(field, walls))
 
     def read(self) -> pa.Table:
         """Return all rows by number, each flight once, without wall times."""
-        table = self._whole()
-        return table.drop_columns([_WALL]).replace_schema_metadata(schema_of(self.plan).metadata)
-
-    def walls(self) -> list[float]:
-        """Return the wall times of all flights, s."""
-        return self._whole().column(_WALL).to_pylist()  # type: ignore[no-any-return]
-
-    def _whole(self) -> pa.Table:
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        paths = sorted(self.folder.glob("*.parquet"))
-        if not paths:
-            empty = table_of(self.plan, [])
-            return empty.append_column(pa.field(_WALL, pa.float64()), pa.array([], pa.float64()))
-        whole = pa.concat_tables([pq.read_table(path) for path in paths]).sort_by("flight")
+        parts = self._parts.read()
+        if not parts:
+            return table_of(self.plan, [])
+        whole = pa.concat_tables(parts).sort_by("flight").drop_columns([_WALL])
         numbers = whole.column("flight").to_numpy()
         first = np.flatnonzero(np.diff(numbers, prepend=-1))
-        return whole.take(first) if len(first) < len(numbers) else whole
+        whole = whole.take(first) if len(first) < len(numbers) else whole
+        return whole.replace_schema_metadata(schema_of(self.plan).metadata)
 
 
 def write_table(table: pa.Table, folder: Path) -> Path:
-    """Write ``study.parquet`` into ``folder``, where it appears once it is complete, and return its path."""
-    import pyarrow.parquet as pq
-
-    path = folder / _TABLE
-    unfinished = path.with_suffix(".unfinished")
-    pq.write_table(table, unfinished)
-    unfinished.replace(path)
-    return path
+    """Write ``study.parquet`` into ``folder``, and return its path."""
+    return write_parquet(table, folder / _TABLE)

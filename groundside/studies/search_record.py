@@ -13,6 +13,7 @@ import tomli_w
 from ftcc.groundside.results import lock_until_exit, new_folder
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
+from ftcc.groundside.studies.parts import Parts, write_parquet
 from ftcc.groundside.studies.rows import table_of
 from ftcc.groundside.studies.search import Flown, SearchPlan
 from ftcc.groundside.studies.search_sampler import GENERATION
@@ -25,7 +26,6 @@ __all__ = ["TABLE", "Record", "open_search_folder"]
 
 TABLE = "search.parquet"
 _PLAN = "search.toml"
-_FLIGHTS = "flights"
 _APPEND = 2.0
 """Wall time between two files of flights of one generation, s."""
 
@@ -88,11 +88,7 @@ class Record:
     def __init__(self, search: SearchPlan, folder: Path) -> None:
         self._search = search
         self._folder = folder
-        self._parts = folder / _FLIGHTS
-        self._parts.mkdir(exist_ok=True)
-        for left in self._parts.glob("*.unfinished"):
-            left.unlink()
-        self._next = max((int(path.stem) for path in self._parts.glob("*.parquet")), default=-1) + 1
+        self._parts = Parts(folder)
         self._pending: list[Flown] = []
         self._written = time.monotonic()
 
@@ -106,22 +102,16 @@ class Record:
         """Write what has landed since the last time."""
         self._written = time.monotonic()
         if self._pending:
-            self._write(self._parts / f"{self._next:06d}.parquet", self.table(self._pending))
-            self._next += 1
+            self._parts.append(self.table(self._pending))
             self._pending = []
 
     def write(self, flights: Sequence[Flown]) -> Path:
         """Write ``search.parquet``, all flights by number, and return its path."""
-        path = self._folder / TABLE
-        self._write(path, self.table(flights))
-        return path
+        return write_parquet(self.table(flights), self._folder / TABLE)
 
     def read(self) -> dict[int, dict[str, Any]]:
         """Return the rows of all flights that have landed, by number."""
-        import pyarrow.parquet as pq
-
-        paths = sorted(self._parts.glob("*.parquet"))
-        return {row["flight"]: row for path in paths for row in pq.read_table(path).to_pylist()}
+        return {row["flight"]: row for part in self._parts.read() for row in part.to_pylist()}
 
     def table(self, flights: Sequence[Flown]) -> pa.Table:
         """Return flights as a table: the columns of a study, and what the search made of each."""
@@ -188,11 +178,3 @@ class Record:
             refused=row["refused"],
             error=row["error"] or "",
         )
-
-    @staticmethod
-    def _write(path: Path, table: pa.Table) -> None:
-        import pyarrow.parquet as pq
-
-        unfinished = path.with_suffix(".unfinished")
-        pq.write_table(table, unfinished)
-        unfinished.replace(path)
