@@ -11,6 +11,7 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import selectors
+import subprocess
 import sys
 import threading
 import time
@@ -101,6 +102,25 @@ _main_module_lock = threading.Lock()
 """Swarms may be started by several threads."""
 
 
+_compiled: list[tuple[str, str]] = []
+"""Schemes and plants that this process has flown; the fork server has loaded the first."""
+
+
+def _compile_beside_fork_server(what: tuple[str, str]) -> None:
+    """Compile what the fork server, which runs already, has not loaded: otherwise each child would, at the same time.
+
+    Where this fails, the children do it, and report what is wrong.
+    """
+    if _compiled and what not in _compiled:
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        load = [sys.executable, "-c", "import ftcc.groundside.swarm.preload"]
+        subprocess.run(
+            load, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            check=False,
+        )  # fmt: skip
+    _compiled.append(what)
+
+
 @contextlib.contextmanager
 def no_main_module() -> Iterator[None]:
     """Keep children from importing the program that started this process."""
@@ -186,6 +206,7 @@ class SwarmProcesses:
         os.environ[PLANT_VARIABLE] = self.mission.plant
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["ftcc.groundside.swarm.preload"])
+        _compile_beside_fork_server((self.mission.scheme.name, self.mission.plant))
         vehicles = {spec.uav: spec for spec in self.mission.vehicles}
         autopilots = {spec.uav: spec for spec in self.mission.autopilots}
         with no_main_module():
