@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ftcc.groundside.simulation import fly_in_memory
+from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.plan import StudyPlan
 from ftcc.groundside.studies.versions import versions
@@ -62,7 +63,7 @@ class Engine:
 
     def refuse(self, error: OtherVersionError) -> None:
         """Handle a worker of another version."""
-        raise error
+        raise StudyError(f"a process runs another version of the program ({error}): it was changed during the study")
 
     def prepare(self, plan: StudyPlan) -> None:
         """Compile the law before the flights begin."""

@@ -184,7 +184,7 @@ def _refuse_doubles(variations: Sequence[Variation], quantities: Sequence[Random
         if keys.count(key) > 1:
             raise StudyError(f"--vary {key}: given twice; give all values in one --vary, or a distribution")
         if key in ("seed", CASE):
-            instead = "use --samples and --seed" if key == "seed" else "use --against"
+            instead = "use --seeds and --seed" if key == "seed" else "use --against"
             raise StudyError(f"--vary {key}: every combination flies with every seed; {instead}")
 
 

@@ -216,8 +216,8 @@ def test_answers_of_a_table_are_those_counted_by_hand(flown: Study) -> None:
 
 
 def test_sensitivities_name_what_matters(tmp_path: Path) -> None:
-    """The initial altitude of UAV 1 decides its largest error of two seconds; whose elevator fails later does not."""
-    claims = [STUDY["claims"][0] | {"uavs": [1]}]
+    """The initial altitude of UAV 1 decides its greatest altitude of two seconds; whose elevator fails does not."""
+    claims = [STUDY["claims"][0] | {"uavs": [1], "signal": "z - 1000", "bound": "< 9"}]
     changes = {"claims": claims, "against": [], "random": {**STUDY["random"]}}
     plan = plan_study(scenario_in(tmp_path, **changes), samples=32, sensitivity=True)
     assert plan.count == 32 * 6
