@@ -74,9 +74,7 @@ def ftcc(installed: Path, runtime: Path, *arguments: str) -> str:
 
 def test_what_it_claims_holds(installed: Path, tmp_path: Path) -> None:
     run = simulate(mission("altitude_consensus"), tmp_path / "run")
-    from ftcc.groundside.report import claims_of
-
-    assert {result.claim.name: result.ok for result in claims_of(run)} == {
+    assert {result.claim.name: result.ok for result in run.claims()} == {
         "altitude tracking": True,
         "altitude behind the leader at the end": True,
     }

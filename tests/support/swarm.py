@@ -221,7 +221,7 @@ class Swarm:
     def digest(self) -> str:
         """Hash of every bit of the recording."""
         hashed = hashlib.sha256()
-        for array in self.recording:
+        for array in (part for part in self.recording if isinstance(part, np.ndarray)):
             hashed.update(np.ascontiguousarray(array).tobytes())
         return hashed.hexdigest()
 
