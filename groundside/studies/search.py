@@ -177,7 +177,8 @@ def plan_search(
     if method not in (None, *METHODS):
         raise StudyError(f"--method {method}: must be {' or '.join(METHODS)}")
     given = tuple(quantity_of(text, "--over") for text in over)
-    declared = plan_study(name, **options)
+    # What is given replaces the scenario's [study], as in a study.
+    declared = plan_study(name, seeds=1, **options) if given else plan_study(name, **options)
     quantities = given or declared.draws.quantities
     _check_keys(quantities)
     if method == "cmaes" and len(quantities) == 1:
@@ -220,8 +221,9 @@ def _goal(name: str | Path, claim: str | None, declared: StudyPlan, options: dic
     if claim is None or claim in (VERDICT, NOBODY_LOST):
         return claim or VERDICT, declared.claims
     claims = declared.claims
-    if claim not in titles_of(claims):
-        claims = plan_study(name, seeds=1, **options).claims
+    if claim not in titles_of(claims):  # of the scenario's case, or of its [study]
+        others = (plan_study(name, seeds=1, **options), plan_study(name, **options))
+        claims = next((one.claims for one in others if claim in titles_of(one.claims)), others[0].claims)
     titles = titles_of(claims)
     if claim not in titles:
         there_are = ", ".join(dict.fromkeys([*titles_of(declared.claims), *titles, NOBODY_LOST]))

@@ -193,7 +193,7 @@ def test_a_study_killed_at_any_moment_goes_on(flown: Study, tmp_path: Path) -> N
 
 
 def test_until_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
-    plan = plan_study(scenario_in(tmp_path), samples=300)
+    plan = plan_study(scenario_in(tmp_path), samples=130)
     rule = until_of('P("close") < 0.95 at 95 %')
     tables = []
     for jobs in (1, 2):
@@ -201,7 +201,7 @@ def test_until_stops_at_a_look_whatever_the_order(tmp_path: Path) -> None:
         fly_study(plan, open_folder(plan, folder), jobs=jobs, until=rule)
         tables.append(table_bytes(folder))
     draws = pq.read_table(tmp_path / "jobs1" / "study.parquet").num_rows // 2
-    assert draws in (64, 80, 100, 125, 157, 197, 247, 300)
+    assert draws in (64, 80, 100, 125, 130)
     assert tables[0] == tables[1]
 
 
