@@ -39,7 +39,7 @@ SHORTER = {
     "fly": ["--duration", "1", "--viewer", "none", "--mavlink", "none", "--pack", "auto"],
     "verify": ["--case", "flight"],
     "study": ["--duration", "1", "--jobs", "1"],
-    "search": ["--duration", "1", "--jobs", "1", "--budget", "12"],
+    "search": ["--jobs", "1", "--budget", "12"],
     "map": ["--duration", "1", "--jobs", "1", "--x", "faults.0.effectiveness=0.5:1:2", "--y", "faults.0.bias=0:0.1:2"],
 }
 """What is added to commands, so that they end soon and open nothing; of an option given twice the last one counts."""
