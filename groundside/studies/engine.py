@@ -118,7 +118,7 @@ class Pool(Engine):
 
     def close(self) -> None:
         self._stop.set()
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=True, cancel_futures=True)  # a process that still starts would fail aloud
 
 
 def compile_law(plan: StudyPlan) -> None:
