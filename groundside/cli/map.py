@@ -40,7 +40,7 @@ def map_(
         axis_of(x, "--x"),
         axis_of(y, "--y"),
         form=form,
-        variants=[one.strip() for one in variant.split(",") if one.strip()],
+        variants=variant,
         settings=settings or [],
         seed=seed,
         duration=duration,

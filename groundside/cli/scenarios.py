@@ -201,8 +201,7 @@ def _mission_of_row(
             fail(f"--row: {study} says what flies; it takes no other options")
         plan = load_plan(study)
     else:
-        variants = [one.strip() for one in variant.split(",") if one.strip()]
-        options = {"form": form, "variants": variants, "settings": settings or [], "seed": seed, "duration": duration}
+        options = {"form": form, "variants": variant, "settings": settings or [], "seed": seed, "duration": duration}
         plan = plan_study(study, **options)  # type: ignore[arg-type]
     if not 0 <= row < plan.count:
         fail(f"--row {row}: the study has flights 0 to {plan.count - 1}")

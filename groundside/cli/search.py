@@ -64,7 +64,7 @@ def search(
         budget=budget,
         method=method,
         form=form,
-        variants=[one.strip() for one in variant.split(",") if one.strip()],
+        variants=variant,
         settings=settings or [],
         seed=seed,
         duration=duration,

@@ -88,7 +88,7 @@ def study(
         "against": against or [],
         "sensitivity": sensitivity,
         "form": form,
-        "variants": [one.strip() for one in variant.split(",") if one.strip()],
+        "variants": variant,
         "settings": settings or [],
         "seed": seed,
         "duration": duration,

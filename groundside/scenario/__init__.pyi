@@ -12,6 +12,7 @@ from .loading import Scenario as Scenario
 from .loading import load as load
 from .loading import load_airframe as load_airframe
 from .loading import scenario_of as scenario_of
+from .loading import variant_names as variant_names
 from .loading import with_value as with_value
 from .mission import Mission as Mission
 from .mission import resolve as resolve

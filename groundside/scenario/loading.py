@@ -37,6 +37,7 @@ __all__ = [
     "read",
     "scenario_of",
     "shipped",
+    "variant_names",
     "with_value",
 ]
 
@@ -104,8 +105,7 @@ def load(
     """
     path = find(name_or_path)
     settings = setting_texts(settings, path)
-    if isinstance(variants, str):
-        variants = [one.strip() for one in variants.split(",") if one.strip()]
+    variants = variant_names(variants)
     contents = contents_of(path)
     document = contents.document
     _require_tables(path, document)
@@ -136,6 +136,11 @@ def load(
     return Scenario(
         name, path, chosen, ordered, tuple(settings), plan, merged, document, files=contents.files, places=places
     )
+
+
+def variant_names(variants: str | Sequence[str]) -> list[str]:
+    """Return the names in a sequence, or in a text with commas between them."""
+    return [one.strip() for one in variants.split(",") if one.strip()] if isinstance(variants, str) else list(variants)
 
 
 def scenario_of(

@@ -8,10 +8,6 @@ from .campaign import larger as larger
 from .campaign import open_folder as open_folder
 from .campaign import study as study
 from .documents import as_json as as_json
-from .engine import Engine as Engine
-from .engine import catch_ctrl_c as catch_ctrl_c
-from .engine import fly_all as fly_all
-from .engine import local_engine as local_engine
 from .errors import StudyError as StudyError
 from .figures import draw as draw
 from .flying import Outcome as Outcome

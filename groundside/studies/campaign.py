@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -9,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ftcc.groundside.errors import UserError
 from ftcc.groundside.results import lock_until_exit, new_folder
 from ftcc.groundside.statistics import LOST, Share, Until, share, until_of
 from ftcc.groundside.studies.engine import Engine, catch_ctrl_c, fly_all, local_engine
@@ -110,8 +112,18 @@ def open_folder(plan: StudyPlan, out: str | Path | None, resume: bool = False) -
         check_same(plan, place)
         lock_until_exit(place)
         larger(load_plan(place), plan.draws.samples)
-    save_plan(plan, place)
     return place
+
+
+@contextlib.contextmanager
+def nothing_left_of_a_refusal(folder: Path) -> Iterator[None]:
+    """Remove the new, still empty folder of a study that cannot begin."""
+    try:
+        yield
+    except UserError:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        raise
 
 
 def fly_study(
@@ -141,17 +153,17 @@ def fly_study(
         False if Ctrl-C interrupted it: `open_folder` with ``resume`` goes on.
     """
     if cluster is not None and record:
-        raise StudyError(
-            "--record: workers of a cluster may have no folder in common; record single flights with --row"
-        )
+        with nothing_left_of_a_refusal(folder):
+            raise StudyError("--record: workers of a cluster may share no folder; record single flights with --row")
     dataset = Dataset(plan, folder)
-    flight = _Landed(plan, dataset, until, report)
     complete = False
-    if not flight.enough:
-        engine: Engine | None = None
+    with nothing_left_of_a_refusal(folder):
+        flight = _Landed(plan, dataset, until, report)
+        engine = None if flight.enough else engine_for(plan, jobs, cluster, folder if record else None, flight.missing)
+        save_plan(plan, folder)
+    if engine is not None:
         try:
             with catch_ctrl_c() as raise_if_interrupted:
-                engine = engine_for(plan, jobs, cluster, folder if record else None, flight.missing)
                 engine.prepare(plan)
                 raise_if_interrupted()
                 flight.begin()
@@ -161,8 +173,7 @@ def fly_study(
             complete = False
         finally:
             flight.flush()
-            if engine is not None:
-                engine.close()
+            engine.close()
     table = dataset.read()
     if flight.stop_at is not None:
         table = table.slice(0, _rows_before(table, flight.stop_at * len(plan.combinations)))

@@ -6,6 +6,7 @@ its batches, which fly again; a flight that kills its worker once more is a row 
 
 from __future__ import annotations
 
+import abc
 import collections
 import contextlib
 import multiprocessing
@@ -42,7 +43,7 @@ _POLL = 0.5
 """Time after which Ctrl-C takes effect where no flight ends, s."""
 
 
-class Engine:
+class Engine(abc.ABC):
     """Where batches fly."""
 
     workers = 1
@@ -54,21 +55,21 @@ class Engine:
     died: tuple[type[BaseException], ...] = ()
     """What a future raises if its worker died."""
 
+    @abc.abstractmethod
     def submit(self, plan: bytes, numbers: Sequence[int]) -> Future[list[Outcome]]:
         """Submit a batch."""
-        raise NotImplementedError
 
-    def recover(self) -> None:
+    def prepare(self, plan: StudyPlan) -> None:  # noqa: B027 (nothing to do where other computers compile)
+        """Compile the law before the flights begin."""
+
+    def recover(self) -> None:  # noqa: B027 (nothing to do where workers come back by themselves)
         """Make ready for the next batch after a worker died."""
 
     def refuse(self, error: OtherVersionError) -> None:
         """Handle a worker of another version."""
         raise StudyError(f"a process runs another version of the program ({error}): it was changed during the study")
 
-    def prepare(self, plan: StudyPlan) -> None:
-        """Compile the law before the flights begin."""
-
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 (nothing to do where no process was started)
         """End all flights."""
 
 

@@ -15,11 +15,11 @@ from ftcc.groundside.studies.plan import StudyPlan, Variation
 from ftcc.groundside.studies.quantities import Draws, RandomQuantity
 from ftcc.groundside.studies.versions import difference, versions
 
-__all__ = ["PLAN_FILE", "check_same", "is_study", "load_plan", "save_plan"]
+__all__ = ["PLAN_FILE", "check_same", "is_study", "load_plan", "refuse_another", "save_plan"]
 
 PLAN_FILE = "study.toml"
 _FORMAT = 1
-_OF_ONE_RUN = ("samples", "versions")
+_OF_ONE_RUN = ("samples",)
 """What may differ where a study goes on: it may become larger."""
 
 
@@ -67,13 +67,20 @@ def check_same(plan: StudyPlan, folder: Path) -> None:
     ------
     StudyError
     """
-    there, here = _document(load_plan(folder)), tomllib.loads(tomli_w.dumps(_document(plan)))
-    there = tomllib.loads(tomli_w.dumps(there))
-    differing = [key for key in here if key not in _OF_ONE_RUN and here[key] != there.get(key)]
-    if differing:
-        raise StudyError(
-            f"{folder}: holds another study: {', '.join(differing)} differ; give another folder with --out"
-        )
+    there, here = (tomllib.loads(tomli_w.dumps(_document(one))) for one in (load_plan(folder), plan))
+    refuse_another("study", folder, here, there)
+
+
+def refuse_another(kind: str, folder: Path, here: dict[str, Any], there: dict[str, Any]) -> None:
+    """Refuse to go on in a folder whose document says something else.
+
+    Raises
+    ------
+    StudyError
+    """
+    if differing := [key for key in here if key not in _OF_ONE_RUN and here[key] != there.get(key)]:
+        what = ", ".join(differing)
+        raise StudyError(f"{folder}: holds another {kind}: {what} differ; give another folder with --out")
 
 
 def _document(plan: StudyPlan) -> dict[str, Any]:

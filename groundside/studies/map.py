@@ -17,14 +17,14 @@ from ftcc.groundside.scenario import ScenarioError, resolve, trims_under_faults
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.folder import load_plan
 from ftcc.groundside.studies.measures import Measure, measures_of, titles_of
-from ftcc.groundside.studies.plan import StudyPlan
+from ftcc.groundside.studies.plan import StudyPlan, Variation
 from ftcc.groundside.studies.planning import plan_study
 from ftcc.groundside.studies.results import Study
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["END", "Axis", "Curve", "Map", "axis_of", "check_claim", "plan_map"]
+__all__ = ["END", "Curve", "Map", "axis_of", "check_claim", "plan_map"]
 
 END = "tracking error at the end"
 """The question of a map without a claim: the verdict's tracking errors against what the verdict allows."""
@@ -40,14 +40,6 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Axis:
-    """A key of the scenario and equidistant values."""
-
-    key: str
-    values: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Curve:
     """A boundary that theory draws: ``height`` over ``x`` and ``y`` is 0 there, and positive where theory agrees."""
 
@@ -60,7 +52,7 @@ class Curve:
     """Whether it is the boundary of level trim; else a condition that the scenario's checks state."""
 
 
-def axis_of(text: str, option: str) -> Axis:
+def axis_of(text: str, option: str) -> Variation:
     """Read ``KEY=low:high:count``.
 
     Raises
@@ -81,11 +73,11 @@ def axis_of(text: str, option: str) -> Axis:
     if count < 2:
         raise StudyError(f"{option} {text}: count must be at least 2")
     # Decimal, so that the file of the study and the axis show 0.3, not 0.30000000000000004.
-    return Axis(key, tuple(float(f"{value:.12g}") for value in np.linspace(low, high, count)))
+    return Variation(key, tuple(float(f"{value:.12g}") for value in np.linspace(low, high, count)))
 
 
 def plan_map(
-    name: str | Path, x: Axis, y: Axis, *, settings: Sequence[str] = (), **options: Any
+    name: str | Path, x: Variation, y: Variation, *, settings: Sequence[str] = (), **options: Any
 ) -> tuple[StudyPlan, tuple[int, ...]]:
     """Plan the flights of a map; return the study, and the faults that fly without a level trim because axes vary them.
 
@@ -141,7 +133,7 @@ class Map:
         self.claim = claim
         if len(self.plan.documents) > 1 or [len(self.plan.varied), self.plan.draws.count] != [2, 1]:
             raise StudyError(f"{folder}: no map: needs one flight for each combination of two varied keys")
-        x, y = (Axis(one.key, one.values) for one in self.plan.varied)
+        x, y = self.plan.varied
         self.x, self.y = x, y
         self._table: pa.Table = Study(folder).table
 

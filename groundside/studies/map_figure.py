@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ftcc.airside.scheme import quantities
-from ftcc.groundside.studies.map import Axis, Map
+from ftcc.groundside.studies.map import Map
+from ftcc.groundside.studies.plan import Variation
 from ftcc.link.actuators import unit_of
 
 __all__ = ["draw_map"]
@@ -69,7 +70,7 @@ def _size(x: Any, y: Any) -> float:
     return float(np.clip(150.0 / max(len(x), len(y)), 1.5, 6.0))
 
 
-def _label(flown: Map, axis: Axis) -> str:
+def _label(flown: Map, axis: Variation) -> str:
     """Return the key with its unit, where that is known."""
     parts = axis.key.split(".")
     if parts[0] == "faults" and parts[-1] == "bias":

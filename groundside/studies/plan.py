@@ -157,13 +157,6 @@ class StudyPlan:
                 problem = "; ".join(error.problems)
         return values, None, problem
 
-    def settings_of(self, trial: Trial, values: Sequence[Any]) -> dict[str, Any]:
-        """Return all values, by key, that distinguish a flight from the scenario."""
-        chosen = zip(self.variations, self.combinations[trial.combination], strict=True)
-        found = {variation.key: value for variation, value in chosen if variation.key != CASE}
-        found |= {one.key: value for one, value in zip(self.draws.quantities, values, strict=True)}
-        return found | {"seed": trial.seed}
-
     def scenario(
         self, combination: int, values: Sequence[Any], seed: int, claims: Sequence[dict[str, Any]] = ()
     ) -> Scenario:

@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from ftcc.groundside.claims import by_case
-from ftcc.groundside.scenario import Scenario, ScenarioError, find, load, read, resolve, shipped, validate
+from ftcc.groundside.scenario import (
+    Scenario,
+    ScenarioError,
+    find,
+    load,
+    read,
+    resolve,
+    shipped,
+    validate,
+    variant_names,
+)
 from ftcc.groundside.schema import Claim, StudyFields
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.plan import CASE, StudyPlan, Variation
@@ -33,7 +43,7 @@ def plan_study(
     against: Sequence[str] = (),
     sensitivity: bool = False,
     form: str | None = None,
-    variants: Sequence[str] = (),
+    variants: str | Sequence[str] = (),
     settings: Sequence[str] = (),
     seed: int | None = None,
     duration: float | None = None,
@@ -96,7 +106,7 @@ def plan_study(
         fields,
         against or fields.against,
         form=form or fields.form,
-        variants=variants or fields.variants,
+        variants=variant_names(variants) or fields.variants,
         settings=settings,
         seed=seed if seed is not None else fields.seed,
         duration=duration,

@@ -13,6 +13,7 @@ import tomli_w
 from ftcc.groundside.results import lock_until_exit, new_folder
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
+from ftcc.groundside.studies.folder import refuse_another
 from ftcc.groundside.studies.parts import Parts, write_parquet
 from ftcc.groundside.studies.rows import table_of
 from ftcc.groundside.studies.search import Flown, SearchPlan
@@ -52,11 +53,7 @@ def open_search_folder(search: SearchPlan, out: str | Path | None, resume: bool 
         there = tomllib.loads((place / _PLAN).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise StudyError(f"{place / _PLAN}: damaged: {error}") from None
-    here = tomllib.loads(text)
-    if differing := [key for key in here if here[key] != there.get(key)]:
-        raise StudyError(
-            f"{place}: holds another search: {', '.join(differing)} differ; give another folder with --out"
-        )
+    refuse_another("search", place, tomllib.loads(text), there)
     lock_until_exit(place)
     return place
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Swarm"]
 
 _LOOK = 0.02
-"""Wall time between two looks at a swarm that starts, flies or ends, s."""
+"""Wall time between two looks at a swarm, s."""
 _WRITTEN_WITHIN = 5.0
 """Wall time within which the processes of a held swarm have written what they recorded, s."""
 

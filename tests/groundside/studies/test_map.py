@@ -13,6 +13,7 @@ from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario import ScenarioError, load, resolve, trims_under_faults
 from ftcc.groundside.studies import Map, axis_of, check_claim, draw_map, open_folder, plan_map
 from ftcc.groundside.studies.flying import Outcome
+from ftcc.groundside.studies.folder import save_plan
 from ftcc.groundside.studies.rows import table_of, write_table
 
 X, Y = axis_of("faults.0.effectiveness=0.1:0.9:5", "--x"), axis_of("faults.0.bias=-0.6:0.6:4", "--y")
@@ -27,6 +28,7 @@ def landed(planned: Any, folder: Path, of: Any) -> Path:
     """A folder with a table of flights that need not be flown."""
     plan, _ = planned
     place = open_folder(plan, folder)
+    save_plan(plan, place)
     write_table(table_of(plan, [of(n) for n in range(plan.count)]), place)
     return place
 
