@@ -27,7 +27,16 @@ from ftcc.groundside.verdict import FAILED
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["WITHOUT_END", "Progress", "engine_for", "fly_study", "larger", "open_folder", "study"]
+__all__ = [
+    "WITHOUT_END",
+    "Progress",
+    "engine_for",
+    "fly_study",
+    "larger",
+    "nothing_left_of_a_refusal",
+    "open_folder",
+    "study",
+]
 
 _APPEND = 2.0
 """Wall time between two files of the dataset, s."""

@@ -23,7 +23,7 @@ from ftcc.groundside.studies.versions import versions
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["TABLE", "Record", "open_search_folder"]
+__all__ = ["TABLE", "Record", "open_search_folder", "save_search"]
 
 TABLE = "search.parquet"
 _PLAN = "search.toml"
@@ -41,11 +41,8 @@ def open_search_folder(search: SearchPlan, out: str | Path | None, resume: bool 
     RunError
         If the folder cannot be written or is taken.
     """
-    text = tomli_w.dumps(_document(search))
     if not resume:
-        place = new_folder(search.study.name, out, "studies")
-        (place / _PLAN).write_text(text, encoding="utf-8")
-        return place
+        return new_folder(search.study.name, out, "studies")
     if out is None or not (Path(out) / _PLAN).is_file():
         raise StudyError(f"--resume: {out or 'no folder given with --out'}: holds no search to go on with")
     place = Path(out)
@@ -53,9 +50,14 @@ def open_search_folder(search: SearchPlan, out: str | Path | None, resume: bool 
         there = tomllib.loads((place / _PLAN).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise StudyError(f"{place / _PLAN}: damaged: {error}") from None
-    refuse_another("search", place, tomllib.loads(text), there)
+    refuse_another("search", place, tomllib.loads(tomli_w.dumps(_document(search))), there)
     lock_until_exit(place)
     return place
+
+
+def save_search(search: SearchPlan, folder: Path) -> None:
+    """Write ``search.toml``."""
+    (folder / _PLAN).write_text(tomli_w.dumps(_document(search)), encoding="utf-8")
 
 
 def _document(search: SearchPlan) -> dict[str, Any]:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ftcc.groundside.statistics import upper_bound
-from ftcc.groundside.studies.campaign import engine_for
+from ftcc.groundside.studies.campaign import engine_for, nothing_left_of_a_refusal
 from ftcc.groundside.studies.engine import Engine, catch_ctrl_c, fly_all
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.search import Flown, SearchPlan, flights_of, toml_of
-from ftcc.groundside.studies.search_record import Record
+from ftcc.groundside.studies.search_record import Record, save_search
 from ftcc.groundside.studies.search_sampler import GENERATION
 
 __all__ = ["WORST", "Found", "fly_search"]
@@ -134,20 +134,21 @@ def fly_search(
     Found or None
         None if Ctrl-C interrupted it.
     """
+    with nothing_left_of_a_refusal(folder):
+        engine = engine or engine_for(search.study, jobs, cluster, None, GENERATION)
+    save_search(search, folder)
     record = Record(search, folder)
-    flight = _Flight(search, record, report)
+    flight = _Flight(search, record, engine, report)
     try:
         with catch_ctrl_c() as raise_if_interrupted:
-            flight.engine = engine or engine_for(search.study, jobs, cluster, None, GENERATION)
-            flight.engine.prepare(search.study)
+            engine.prepare(search.study)
             flight.raise_if_interrupted = raise_if_interrupted
             raise_if_interrupted()
             flights, bracket = flights_of(search, flight.fly)
     except KeyboardInterrupt:
         return None
     finally:
-        if flight.engine is not None:
-            flight.engine.close()
+        engine.close()
         record.flush()
     found = Found(search, tuple(flights), bracket)
     record.write(found.flights)
@@ -161,8 +162,10 @@ def fly_search(
 class _Flight:
     """Flies what is asked for, unless it has flown before."""
 
-    def __init__(self, search: SearchPlan, record: Record, report: Callable[[Sequence[Flown]], None]) -> None:
-        self.engine: Engine | None = None
+    def __init__(
+        self, search: SearchPlan, record: Record, engine: Engine, report: Callable[[Sequence[Flown]], None]
+    ) -> None:
+        self._engine = engine
         self.raise_if_interrupted: Callable[[], None] = lambda: None
         self._search = search
         self._record = record
@@ -174,7 +177,6 @@ class _Flight:
         self, first: int, stage: str, points: Sequence[tuple[float, ...]], rows: Sequence[tuple[Any, ...]]
     ) -> list[Flown]:
         """Return flights from number ``first`` on, in their order."""
-        assert self.engine is not None
         search, there = self._search, dict[int, Flown]()
         for number, point, row in zip(range(first, first + len(rows)), points, rows, strict=True):
             if number in self._known:
@@ -196,7 +198,7 @@ class _Flight:
         plan = replace(search.study, draws=replace(search.draws, first=first, rows=tuple(rows)))
         missing = [number for number in range(first, first + len(rows)) if number not in there]
         if missing:
-            fly_all(plan, iter(missing), self.engine, land, self.raise_if_interrupted)
+            fly_all(plan, iter(missing), self._engine, land, self.raise_if_interrupted)
             self._record.flush()
         self._report(self._landed)
         return [there[number] for number in range(first, first + len(rows))]

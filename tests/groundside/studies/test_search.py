@@ -24,7 +24,7 @@ from ftcc.groundside.studies.engine import Engine
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.quantities import quantity_of
 from ftcc.groundside.studies.search import NOBODY_LOST, SearchPlan, plan_search
-from ftcc.groundside.studies.search_record import open_search_folder
+from ftcc.groundside.studies.search_record import open_search_folder, save_search
 from ftcc.groundside.studies.search_sampler import GENERATION
 from ftcc.groundside.studies.searching import Found, fly_search
 
@@ -243,6 +243,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_folder_of_another_search_is_refused(disc: SearchPlan, tmp_path: Path) -> None:
     folder = open_search_folder(disc, tmp_path / "out")
+    save_search(disc, folder)
     with pytest.raises(UserError, match="holds another search: budget differ"):
         open_search_folder(replace(disc, budget=7), folder, resume=True)
     with pytest.raises(UserError, match="holds no search"):
