@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import re
@@ -12,7 +13,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pyarrow.parquet as pq
 import pytest
 import tomli_w
@@ -141,10 +141,10 @@ def test_a_process_that_is_killed_costs_no_row(flown: Study, tmp_path: Path) -> 
     killed: list[int] = []
 
     def kill(now: Progress) -> None:
-        workers = [one for one in psutil.Process().children() if "spawn_main" in " ".join(one.cmdline())]
+        workers = [one.pid for one in multiprocessing.active_children() if one.pid and one.name.startswith("Spawn")]
         if now.flown >= 4 and not killed and workers:
-            killed.append(workers[0].pid)
-            os.kill(workers[0].pid, signal.SIGKILL)
+            killed.append(max(workers))
+            os.kill(killed[0], signal.SIGKILL)
 
     assert fly_study(flown.plan, open_folder(flown.plan, tmp_path), jobs=2, report=kill)
     assert killed
