@@ -53,7 +53,7 @@ cache_folder: Path = cache.folder()
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
-from numba.core import types  # noqa: E402
+from numba.core import caching, types  # noqa: E402
 from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
@@ -95,12 +95,7 @@ def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
     settings = {"cache": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    made = numba.njit(**settings)(function)
-    kept: Any = made
-    if isinstance(made, Dispatcher):
-        file = kept._cache._cache_file
-        kept._cache._cache_file = _CacheFile(file._cache_path, file._index_name[: -len(".nbi")], file._source_stamp)
-    return made  # type: ignore[no-any-return]
+    return numba.njit(**settings)(function)  # type: ignore[no-any-return]
 
 
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
@@ -149,7 +144,9 @@ class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
         """Do nothing: `_CacheFile.save` creates it."""
 
 
+# For every function of this process, also one that somebody's law compiles with numba itself.
 CacheImpl._locator_classes = [_Locator]
+caching.IndexDataCacheFile = _CacheFile
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

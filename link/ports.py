@@ -46,8 +46,8 @@ class PortBlock:
 
     base: int
     uavs: tuple[int, ...]
-    guard: socket.socket | None = field(default=None, repr=False)
-    """Listens on the block's first TCP port, which has no other use: its holder holds the block."""
+    guards: tuple[socket.socket, ...] = field(default=(), repr=False)
+    """Listen on the TCP ports at which a block may begin: their holder holds the block."""
 
     @property
     def station(self) -> int:
@@ -70,9 +70,19 @@ class PortBlock:
 
     def release(self) -> None:
         """Release the block."""
-        if self.guard is not None:
-            self.guard.close()
-            self.guard = None
+        for guard in self.guards:
+            guard.close()
+        self.guards = ()
+
+    @property
+    def guarded(self) -> tuple[int, ...]:
+        """The ports on which it is held: its first, and every other at which one begins that is not given.
+
+        Where a block's place is given, some of these may be TCP ports that it uses itself; they are left out.
+        """
+        begins = range(-(-self.base // _STRIDE) * _STRIDE, self.base + self.size, _STRIDE)
+        used = {*self.viewer, *(self.of(uav).mesh for uav in self.uavs)}
+        return (self.base, *(port for port in begins if port != self.base and port not in used))
 
 
 def _refused(error: OSError, port: int) -> OSError | None:
@@ -95,13 +105,12 @@ def _require_loopback() -> None:
             ) from None
 
 
-def _in_use(base: int, size: int) -> int | None:
-    """A port of the block that is in use, beside the guard's own."""
+def _in_use(block: PortBlock) -> int | None:
+    """A port of a held block that is in use, beside those on which it is held."""
     from ftcc.link.mavlink import LOOPBACK  # listing running swarms needs no MAVLink
 
-    ports = range(base, base + size)
-    # Guards first: a port of a block that another swarm holds, but does not use yet, must not be bound even to try it.
-    tcp = sorted(ports[1:], key=lambda port: (port % _STRIDE != 0, port))
+    ports = range(block.base, block.base + block.size)
+    tcp = [port for port in ports if port not in block.guarded]
     for kind, port in (*((socket.SOCK_STREAM, port) for port in tcp), *((socket.SOCK_DGRAM, port) for port in ports)):
         with socket.socket(socket.AF_INET, kind) as probe:
             if kind == socket.SOCK_STREAM:
@@ -115,20 +124,22 @@ def _in_use(base: int, size: int) -> int | None:
     return None
 
 
-def _guard(base: int) -> socket.socket | None:
+def _hold(block: PortBlock) -> int | None:
+    """Hold a block; the port for which that is impossible, as another holds or uses it."""
     from ftcc.link.mavlink import LOOPBACK
 
-    guard = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    guard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        guard.bind((LOOPBACK, base))
-        guard.listen()
-    except OSError as error:
-        guard.close()
-        if refused := _refused(error, base):
-            raise refused from None
-        return None
-    return guard
+    for port in block.guarded:
+        guard = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        block.guards += (guard,)
+        guard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            guard.bind((LOOPBACK, port))
+            guard.listen()
+        except OSError as error:
+            if refused := _refused(error, port):
+                raise refused from None
+            return port
+    return None
 
 
 def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
@@ -147,17 +158,15 @@ def reserve(uavs: Sequence[int], base: int | None = None) -> PortBlock:
     candidates = [base] if base is not None else range(_FIRST, _END - size, stride)
     for candidate in candidates:
         block = PortBlock(candidate, tuple(uavs))
-        taken: int | None = candidate
-        block.guard = _guard(candidate)
-        if block.guard is not None:
-            try:
-                taken = _in_use(candidate, size)
-            except OSError:
-                block.release()
-                raise
-            if taken is None:
-                return block
+        try:
+            # Held first: a port of a block that another swarm holds, but does not use yet, is not bound even to try it.
+            taken = _hold(block) or _in_use(block)
+        except OSError:
             block.release()
+            raise
+        if taken is None:
+            return block
+        block.release()
         if base is not None:
             raise PortError(
                 f"port {taken} is in use; the block {candidate}-{candidate + size - 1} must be free "

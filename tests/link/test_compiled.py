@@ -131,6 +131,16 @@ def test_processes_that_compile_one_function_for_other_types_at_once_each_find_t
             assert file.load((str(who), n)) == f"code of {who}, {n}"
 
 
+def test_what_somebody_compiles_with_numba_itself_is_kept_there_too(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import ftcc.link.compiled\nimport numba\n"
+        "@numba.njit('int64(int64)', cache=True)\ndef successor(n):\n    return n + 1\n"
+        "print(successor(3), sum(successor.stats.cache_hits.values()))\n"
+    )
+    for hits in (0, 1):
+        assert run([str(tmp_path / "own.py")], FTCC_CACHE_DIR=str(tmp_path / "cache")) == f"4 {hits}"
+
+
 def test_a_cache_that_another_process_holds_for_ever_costs_the_kept_code_alone(tmp_path, monkeypatch):
     def never(place):
         raise cache.CacheBusyError("process 7 has held it")

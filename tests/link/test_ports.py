@@ -12,6 +12,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from ftcc.link import ports
 from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.ports import PortBlock, PortError, reserve, runtime_folder
 
@@ -30,6 +31,13 @@ def blocks() -> Iterator[ExitStack]:
         yield stack
 
 
+@pytest.fixture
+def apart(monkeypatch):
+    """Blocks where no other test's swarm takes any: what is released stays free."""
+    monkeypatch.setattr(ports, "_FIRST", 10000)
+    monkeypatch.setattr(ports, "_END", 20000)
+
+
 def held(stack: ExitStack, *arguments: object) -> PortBlock:
     block = reserve(*arguments)  # type: ignore[arg-type]
     stack.callback(block.release)
@@ -39,17 +47,17 @@ def held(stack: ExitStack, *arguments: object) -> PortBlock:
 def all_ports(block: PortBlock) -> list[int]:
     own = [block.station, *block.viewer]
     for uav in block.uavs:
-        ports = block.of(uav)
-        own += [ports.vehicle, ports.autopilot, ports.ground, ports.mesh]
+        of = block.of(uav)
+        own += [of.vehicle, of.autopilot, of.ground, of.mesh]
     return own
 
 
 def test_every_use_has_a_port_of_its_own_within_the_block(blocks):
     block = held(blocks, UAVS)
-    ports = all_ports(block)
-    assert len(set(ports)) == len(ports) == 3 + 4 * len(UAVS)
-    assert min(ports) == block.base
-    assert max(ports) < block.base + block.size
+    every = all_ports(block)
+    assert len(set(every)) == len(every) == 3 + 4 * len(UAVS)
+    assert min(every) == block.base
+    assert max(every) < block.base + block.size
 
 
 def test_blocks_lie_below_the_ephemeral_range(blocks):
@@ -70,7 +78,7 @@ def test_a_block_is_held_before_its_first_socket_opens_and_against_other_process
     assert int(finished.stdout) != block.base
 
 
-def test_a_released_block_is_the_first_free_one_again():
+def test_a_released_block_is_the_first_free_one_again(apart):
     first = reserve(UAVS)
     base = first.base
     first.release()
@@ -81,7 +89,7 @@ def test_a_released_block_is_the_first_free_one_again():
 
 
 @pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_STREAM], ids=["UDP", "TCP"])
-def test_a_given_block_with_a_port_in_use_is_refused_and_the_port_named(kind):
+def test_a_given_block_with_a_port_in_use_is_refused_and_the_port_named(apart, kind):
     block = reserve(UAVS)
     base = block.base
     block.release()
@@ -98,7 +106,7 @@ def test_a_given_block_with_a_port_in_use_is_refused_and_the_port_named(kind):
         assert "leave the option out" in str(refusal.value)
 
 
-def test_without_a_given_port_a_block_with_a_port_in_use_is_passed_over():
+def test_without_a_given_port_a_block_with_a_port_in_use_is_passed_over(apart):
     first = reserve(UAVS)
     first.release()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
@@ -114,7 +122,7 @@ def test_a_given_block_that_another_swarm_holds_is_refused(blocks):
         reserve(UAVS, block.base)
 
 
-def test_a_block_that_is_held_but_not_used_yet_is_not_even_tried(blocks, monkeypatch):
+def test_a_block_that_is_held_but_not_used_yet_is_not_even_tried(apart, blocks, monkeypatch):
     """Its swarm could find a port in use at the very moment at which another one tries it."""
     first, second = (held(blocks, range(1, 9)) for _ in range(2))
     assert second.base == first.base + 100
@@ -136,7 +144,23 @@ def test_a_block_that_is_held_but_not_used_yet_is_not_even_tried(blocks, monkeyp
     )
 
 
-def test_a_given_free_block_is_taken_as_it_is(blocks):
+def test_a_large_block_is_held_wherever_a_small_one_could_begin(blocks):
+    """Else a small swarm could take its middle while the large one still looks at its ports one by one."""
+    large = held(blocks, range(1, 41))
+    for begin in range(large.base, large.base + large.size, 100):
+        with pytest.raises(PortError, match=f"port {begin} is in use"):
+            reserve(UAVS, begin)
+
+
+@pytest.mark.parametrize("place", range(100))
+def test_wherever_a_block_is_put_it_does_not_hold_a_port_that_its_swarm_opens_itself(place):
+    block = PortBlock(20000 + place, tuple(range(1, 41)))
+    opened = {*block.viewer, *(block.of(uav).mesh for uav in block.uavs)}
+    assert not opened & set(block.guarded)
+    assert set(block.guarded) <= set(range(block.base, block.base + block.size))
+
+
+def test_a_given_free_block_is_taken_as_it_is(apart, blocks):
     free = reserve(UAVS)
     free.release()
     assert held(blocks, UAVS, free.base).base == free.base
