@@ -52,7 +52,7 @@ class Subject:
             title=mission.title,
             family=_family(mission),
             graph=mission.graph,
-            signals=mission.scheme.signals,
+            signals=mission.signals,
             limits={name: follower.limits[SLOT[name]] for name in mission.scheme.commands},
             disturbances=plant.DISTURBANCES,
             obstacles=mission.obstacles,

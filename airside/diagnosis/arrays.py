@@ -1,0 +1,161 @@
+"""What the stage `diagnose` works on, a row per UAV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.airside.diagnosis.beliefs import new_beliefs, new_health
+from ftcc.airside.diagnosis.estimator import STATES
+from ftcc.airside.diagnosis.gains import DiagnosisGains
+from ftcc.airside.flight_path import Own
+from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import ACTUATORS, in_slots
+from ftcc.link.compiled import Room, width
+
+__all__ = ["Diagnosis", "Memory", "Trial", "new_diagnosis"]
+
+
+class Memory(NamedTuple):
+    """What is remembered of a UAV as a whole."""
+
+    begun_at: float
+    """Time of the first tick, s; nan before it."""
+    bank_slip: float
+    """Observers of the kinematics of bank, angle of attack and sideslip: their errors, rad."""
+    alpha_slip: float
+    beta_slip: float
+    excused_until: float
+    """Until when alarms are put down to a navigation fault, s."""
+
+
+class Trial(NamedTuple):
+    """What is remembered of an actuator."""
+
+    position: float
+    """By the nominal actuator, without a fault; its unit."""
+    rate: float
+    """Of it, where it is of second order, unit/s."""
+    direct: float
+    """Observer of the motion: its error, unit times s; of the motion less what the air does to it likewise."""
+    calm: float
+    direct_base: float
+    """What ``direct`` has learned to expect, unit."""
+    up: float
+    """Sums of the test, in both directions, unit times s."""
+    down: float
+    quiet_at: float
+    """When the larger one was last zero, s."""
+    apart: float
+    """How long the two observers have disagreed, s."""
+    kept_effectiveness: float
+    """Effectiveness and additive effect before the alarm."""
+    kept_bias: float
+    candidate: float
+    """Kind that data speak for at present, and since when, s."""
+    candidate_since: float
+    slow_position: float
+    """``position`` through a lag of `decision.SLUGGISH` s."""
+    sums: Annotated[NDArray[np.float64], Room((10,))]
+    """Weighted sums since the alarm, see `decision.gather`."""
+    x: Annotated[NDArray[np.float64], Room((STATES,))]
+    """State and covariance of the filter, see `estimator`."""
+    P: Annotated[NDArray[np.float64], Room((STATES, STATES))]
+
+
+class Diagnosis(NamedTuple):
+    """Of k autopilots; a is 4, the slots of the actuators, or 0 where no UAV of the process has diagnosis."""
+
+    on: NDArray[np.int64]
+    """(k,): 1 where it is on."""
+    accommodates: NDArray[np.int64]
+    """(k,): 1 where the own law is told."""
+    cooperates: NDArray[np.int64]
+    """(k,): 1 where the swarm makes room."""
+    shares: NDArray[np.int64]
+    """(1,): index in a record at which `Health` begins; -1: records have none."""
+    columns: NDArray[np.int64]
+    """(1,): index in ``signals`` at which beliefs begin."""
+    gains: NDArray[np.float64]
+    """(k, n): see `DiagnosisGains`."""
+    has: NDArray[np.int64]
+    """(k, 4): 1 where the aircraft has that actuator."""
+    point: NDArray[np.int64]
+    """(k,): 1 for an aircraft that is steered by load factor and bank."""
+    travel: NDArray[np.float64]
+    """(k, 4): full deflection of the actuators, rad and N."""
+    lag: NDArray[np.float64]
+    """(k, 4): nominal bandwidth of the actuators, rad/s; 0 = none."""
+    damping: NDArray[np.float64]
+    """(k, 4): nominal damping of second-order ones; 0 = first order."""
+    positions: NDArray[np.float64]
+    """(k, 4): mean positions of the nominal actuators since the tick before."""
+    memory: NDArray[np.float64]
+    """(k, n): see `Memory`."""
+    before: NDArray[np.float64]
+    """(k, n): `Own` of the tick before."""
+    motion: NDArray[np.float64]
+    """(k, 4, n): the `Motion` of each actuator at this tick."""
+    trial: NDArray[np.float64]
+    """(k, a, n): see `Trial`."""
+    belief: NDArray[np.float64]
+    """(k, a, n): see `Belief`."""
+    health: NDArray[np.float64]
+    """(k, n): see `Health`."""
+    told: NDArray[np.float64]
+    """(k, 4, 2): effectiveness and bias that the law is told of."""
+    model: NDArray[np.float64]
+    """(k, n): the `Model` that the law is told of."""
+    own: NDArray[np.float64]
+    """(k, n): `Own` with the command in force as it acts by what is believed."""
+
+
+def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> Diagnosis:
+    """Before the first tick; ``signals`` and ``shared`` are the numbers of values of the scheme itself."""
+    k = len(specs)
+    named = [(spec, in_slots(spec.diagnosis.actuators)) for spec in specs]
+    any_on = any(spec.diagnosis.on for spec in specs)
+    a = len(ACTUATORS) if any_on else 0
+    trial = np.zeros((k, a, width(Trial)))
+    unset = (0.0,) * len(DiagnosisGains._fields)
+    gains = np.array([spec.diagnosis.gains or unset for spec in specs], np.float64)
+    first = Trial._fields.index
+    trial[:, :, first("kept_effectiveness")] = 1.0
+    trial[:, :, first("candidate_since")] = math.inf
+    at = width(Trial) - STATES * STATES
+    spread_coefficient = gains[:, DiagnosisGains._fields.index("sd_coefficient")]
+    for i in range(k):
+        trial[i, :, at - STATES + 1] = 1.0
+        for n in (1, 3):
+            trial[i, :, at + n * STATES + n] = spread_coefficient[i] ** 2
+    memory = np.zeros((k, width(Memory)))
+    memory[:, Memory._fields.index("begun_at")] = math.nan
+    told = np.zeros((k, len(ACTUATORS), 2))
+    told[:, :, 0] = 1.0
+    return Diagnosis(
+        on=np.array([spec.diagnosis.on and spec.role == "follower" for spec in specs], np.int64),
+        accommodates=np.array([spec.diagnosis.accommodates for spec in specs], np.int64),
+        cooperates=np.array([spec.diagnosis.cooperates for spec in specs], np.int64),
+        shares=np.array([shared if any_on else -1], np.int64),
+        columns=np.array([signals], np.int64),
+        gains=gains,
+        has=np.array([[name in spec.diagnosis.actuators for name in slots] for spec, slots in named], np.int64),
+        point=np.array(["bank" in spec.diagnosis.actuators for spec in specs], np.int64),
+        travel=np.array([spec.travel for spec in specs], np.float64),
+        lag=np.array([spec.diagnosis.lag for spec in specs], np.float64),
+        damping=np.array([spec.diagnosis.damping for spec in specs], np.float64),
+        positions=np.zeros((k, len(ACTUATORS))),
+        memory=memory,
+        before=np.zeros((k, len(Own._fields))),
+        motion=np.zeros((k, len(ACTUATORS), 5)),
+        trial=trial,
+        belief=new_beliefs(k, a),
+        health=new_health(k),
+        told=told,
+        model=np.array([spec.model for spec in specs], np.float64),
+        own=np.zeros((k, len(Own._fields))),
+    )
