@@ -10,14 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.diagnosis.beliefs import new_beliefs, new_health
+from ftcc.airside.diagnosis.decision import SLEWS, SUMS
 from ftcc.airside.diagnosis.estimator import STATES
 from ftcc.airside.diagnosis.gains import DiagnosisGains
+from ftcc.airside.diagnosis.motion import Motion
 from ftcc.airside.flight_path import Own
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, in_slots
 from ftcc.link.compiled import Room, width
 
-__all__ = ["Diagnosis", "Memory", "Trial", "new_diagnosis"]
+__all__ = ["RECENT", "Diagnosis", "Memory", "Trial", "new_diagnosis"]
+
+RECENT = 128
+"""Ticks that are remembered, to estimate from the onset of a fault on."""
 
 
 class Memory(NamedTuple):
@@ -25,6 +30,12 @@ class Memory(NamedTuple):
 
     begun_at: float
     """Time of the first tick, s; nan before it."""
+    path: float
+    """Observer of the flight path: its error, rad,"""
+    path_base: float
+    """what it has learned to expect, rad/s,"""
+    path_mean: float
+    """and the recent mean of its residual, rad/s."""
     bank_slip: float
     """Observers of the kinematics of bank, angle of attack and sideslip: their errors, rad."""
     alpha_slip: float
@@ -41,27 +52,42 @@ class Trial(NamedTuple):
     rate: float
     """Of it, where it is of second order, unit/s."""
     direct: float
-    """Observer of the motion: its error, unit times s; of the motion less what the air does to it likewise."""
-    calm: float
+    """Observer of the motion: its error, unit times s,"""
     direct_base: float
-    """What ``direct`` has learned to expect, unit."""
+    """what it has learned to expect, unit,"""
+    direct_mean: float
+    """and the recent mean of its residual, unit."""
+    air_square: float
+    """Of the flight path's residual in units of the actuator: recent mean square, unit^2, and product with ``direct``."""
+    air_product: float
+    regressor_mean: float
+    """Recent mean of the uncertain part of the drift, unit."""
     up: float
     """Sums of the test, in both directions, unit times s."""
     down: float
     quiet_at: float
     """When the larger one was last zero, s."""
     apart: float
-    """How long the two observers have disagreed, s."""
+    """Recent mean of what only the flight path says, unit."""
     kept_effectiveness: float
-    """Effectiveness and additive effect before the alarm."""
+    """Before the alarm: effectiveness of the healthy actuator beside that of the nominal one,"""
+    kept_sd: float
+    """Standard deviation of the former,"""
     kept_bias: float
+    """additive effect,"""
     candidate: float
     """Kind that data speak for at present, and since when, s."""
     candidate_since: float
-    slow_position: float
-    """``position`` through a lag of `decision.SLUGGISH` s."""
-    sums: Annotated[NDArray[np.float64], Room((10,))]
+    whole: float
+    """Observer of the motion against a healthy actuator: its error, unit times s."""
+    filtered: float
+    """``position`` through the filter of the residuals."""
+    sums: Annotated[NDArray[np.float64], Room((SUMS,))]
     """Weighted sums since the alarm, see `decision.gather`."""
+    slow: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
+    """The bank of slow actuators, see `decision.follow`."""
+    lagging: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
+    square: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
     x: Annotated[NDArray[np.float64], Room((STATES,))]
     """State and covariance of the filter, see `estimator`."""
     P: Annotated[NDArray[np.float64], Room((STATES, STATES))]
@@ -102,6 +128,10 @@ class Diagnosis(NamedTuple):
     """(k, 4, n): the `Motion` of each actuator at this tick."""
     trial: NDArray[np.float64]
     """(k, a, n): see `Trial`."""
+    recent: NDArray[np.float64]
+    """(k, a, `RECENT`, 4): of the last ticks the measured step, F, R and the position, see `estimator.predict`."""
+    recent_at: NDArray[np.int64]
+    """(k,): number of ticks since the first."""
     belief: NDArray[np.float64]
     """(k, a, n): see `Belief`."""
     health: NDArray[np.float64]
@@ -151,8 +181,10 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
         positions=np.zeros((k, len(ACTUATORS))),
         memory=memory,
         before=np.zeros((k, len(Own._fields))),
-        motion=np.zeros((k, len(ACTUATORS), 5)),
+        motion=np.zeros((k, len(ACTUATORS), len(Motion._fields))),
         trial=trial,
+        recent=np.zeros((k, a, RECENT, 4)),
+        recent_at=np.zeros(k, np.int64),
         belief=new_beliefs(k, a),
         health=new_health(k),
         told=told,

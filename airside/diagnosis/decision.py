@@ -4,48 +4,45 @@ Detection: a two-sided cumulative sum (Page, Biometrika 41, 1954) of the residua
 smaller of two that must agree in sign: that of the motion as it is, which moving air disturbs, and that of the motion
 less what the air does, which a disturbance of the flight path disturbs.
 
-Isolation: Wald statistics of the filter's estimates after the alarm, which the filter's covariances scale: is there a
-bias, is there a loss; and a regression that asks whether the actuator lags.
+Isolation: hypotheses about the kind are compared by how well each explains the residual since the onset.
 """
 
 from __future__ import annotations
 
-from ftcc.airside.diagnosis.beliefs import (
-    BIAS,
-    FLOATING,
-    LOSS,
-    NO_KIND,
-    STUCK,
-    WRONG,
-)
-from ftcc.link.compiled import compiled, fill
+import math
 
-__all__ = ["SLUGGISH", "agreeing", "forget", "gather", "kind_of", "lags", "sum_up"]
+from ftcc.airside.diagnosis.beliefs import BIAS, FLOATING, LOSS, NO_KIND, SLOW, STUCK, WRONG
+from ftcc.link.compiled import compiled
 
-SLUGGISH = 0.3
-"""Time constant of the lag that a slow actuator is compared with, s."""
+__all__ = ["SLEWS", "SUMS", "agreeing", "follow", "gather", "kind_of", "sum_up"]
 
-_FORGET = 2.0
+SLEWS = (0.04, 0.12, 0.36, 1.1)
+"""Slews of the bank of slow actuators, travels a second."""
+SUMS = 6
+"""Number of sums of `gather`."""
+
+_FORGET = 6.0
 """Time constant of the sums, s."""
-_N, _Y, _U, _W, _YY, _UU, _WW, _UY, _WY, _UW = range(10)
-_CERTAIN = 9.0
-"""Wald statistic of an effect that is there: 3 standard deviations."""
-_ABSENT = 4.0
-"""Of one that is not: 2 standard deviations."""
-_FLOOR_EFFECTIVENESS = 0.04
-"""Below this a loss is not told from errors of the model."""
-_NOTHING = 0.15
-"""Effectiveness that counts as none."""
+_N, _Y, _U, _YY, _UU, _UY = range(SUMS)
+_TINY = 1e-12
+_RELATIVE = 0.08
+"""Error of the model, as a share of the position."""
+_INDEPENDENT = 5.0
+"""Independent samples of a residual a second: what the model leaves changes slowly."""
+_COSTS = (0.0, 1.0, 1.0, 2.2, 1.4, 0.5, 2.2)
+"""By kind: of its free numbers, in units of log-likelihood."""
+_ALL = 0.8
+"""Loss that counts as total."""
+_CLEAR = 0.7
+"""By how much the best kind must be better than the second."""
 
 
 @compiled
-def agreeing(first, second):
-    """The smaller one in size where both have one sign, else 0 (minmod)."""
-    if first > 0.0 and second > 0.0:
-        return min(first, second)
-    if first < 0.0 and second < 0.0:
-        return max(first, second)
-    return 0.0
+def agreeing(calm, direct, slack):
+    """Of the residual ``calm`` what ``direct`` confirms but for ``slack``, which is how much the air moves that one."""
+    if calm > 0.0:
+        return min(calm, max(direct + slack, 0.0))
+    return max(calm, min(direct - slack, 0.0))
 
 
 @compiled
@@ -55,71 +52,74 @@ def sum_up(total, residual, drift, most, dt):
 
 
 @compiled
-def gather(sums, residual, position, lagging, dt):
-    """Add a sample to the sums (10,) of residual y, position u, and w, by which u is ahead of a sluggish actuator."""
-    for n in range(10):
+def gather(sums, residual, position, dt):
+    """Add a sample to the sums (6,) of residual y and position u that `kind_of` needs."""
+    for n in range(sums.shape[0]):
         sums[n] *= 1.0 - dt / _FORGET
-    y, u, w = residual, position, lagging
+    y, u = residual, position
     sums[_N] += 1.0
     sums[_Y] += y
     sums[_U] += u
-    sums[_W] += w
     sums[_YY] += y * y
     sums[_UU] += u * u
-    sums[_WW] += w * w
     sums[_UY] += u * y
-    sums[_WY] += w * y
-    sums[_UW] += u * w
 
 
 @compiled
-def _explained(syy, sxx, sxy):
-    """Share of the spread of y that a regression on x explains, and its slope."""
-    if sxx <= 1e-12 or syy <= 1e-12:
-        return 0.0, 0.0
-    return sxy * sxy / (sxx * syy), sxy / sxx
+def follow(slow, lagging, square, residual, position, travel, bandwidth, dt):
+    """Move a bank of slow actuators by a tick, and sum up how well each explains the ``residual``.
 
-
-@compiled
-def lags(sums, least_spread):
-    """Whether the actuator lags: w explains the residual with a negative slope, and far better than u does.
-
-    ``least_spread`` is the standard deviation of w from which on there is anything to see.
+    ``slow`` (4,) are their positions, ``lagging`` (4,) by how much they are behind ``position``, through the filter of
+    the residual, ``square`` (4,) weighted sums of squares of what each leaves unexplained.
     """
-    n = sums[_N]
-    if n < 2.0:
-        return False
-    syy = sums[_YY] - sums[_Y] * sums[_Y] / n
-    suu, sww = sums[_UU] - sums[_U] * sums[_U] / n, sums[_WW] - sums[_W] * sums[_W] / n
-    suy, swy = sums[_UY] - sums[_U] * sums[_Y] / n, sums[_WY] - sums[_W] * sums[_Y] / n
-    if sww < n * least_spread * least_spread:
-        return False
-    by_w, slope = _explained(syy, sww, swy)
-    by_u, _ = _explained(syy, suu, suy)
-    return slope < -0.3 and by_w > 0.5 and 1.0 - by_w < 0.5 * (1.0 - by_u)
+    for n in range(slow.shape[0]):
+        most = SLEWS[n] * travel * dt
+        slow[n] += min(max(position - slow[n], -most), most)
+        lagging[n] += min(bandwidth * dt, 1.0) * (slow[n] - position - lagging[n])
+        away = residual - lagging[n]
+        square[n] = square[n] * (1.0 - dt / _FORGET) + away * away
 
 
 @compiled
-def forget(sums):
-    """Begin the sums anew."""
-    fill(sums, 0.0)
+def kind_of(sums, square, floor, dt):
+    """The kind of fault that explains the residual best, or `NO_KIND` while none is clearly best.
 
-
-@compiled
-def kind_of(loss, bias, P_loss, P_bias, effectiveness, floor):
-    """The kind of fault that estimates speak for; `NO_KIND` while they do not.
-
-    ``loss`` and ``bias`` are the changes of effectiveness and additive effect, ``P_loss`` and ``P_bias`` their
-    variances, ``floor`` the additive effect (unit) that errors of the model may have.
+    Each kind is a regression on the position u or a part of it: floating y = -u, stuck y = b - u, loss y = a u, bias
+    y = b, both y = a u + b, or one of the bank of slow actuators. Their mean squares are compared by log-likelihood,
+    with a cost for each free number (minimum description length, Rissanen, Automatica 14, 1978). ``floor`` is the size
+    of residual that errors of the model may leave.
     """
-    by_loss = loss * loss / (P_loss + _FLOOR_EFFECTIVENESS * _FLOOR_EFFECTIVENESS)
-    by_bias = bias * bias / (P_bias + floor * floor)
-    if effectiveness < _NOTHING and P_loss < 0.01:
-        return STUCK if by_bias > _CERTAIN else FLOATING
-    if by_loss > _CERTAIN and by_bias < _ABSENT:
-        return LOSS
-    if by_bias > _CERTAIN and by_loss < _ABSENT:
-        return BIAS
-    if by_loss > _CERTAIN and by_bias > _CERTAIN:
-        return WRONG
-    return NO_KIND
+    n = max(sums[_N], 1.0)
+    yy, uu, uy = sums[_YY] / n, sums[_UU] / n, sums[_UY] / n
+    y, u = sums[_Y] / n, sums[_U] / n
+    syy, suu, suy = max(yy - y * y, 0.0), max(uu - u * u, 0.0), uy - u * y
+    lines = syy - suy * suy / suu if suu > _TINY else syy
+    slowest = square[0]
+    for m in range(1, square.shape[0]):
+        slowest = min(slowest, square[m])
+    left = (
+        yy,
+        yy - uy * uy / uu if uu > _TINY else yy,
+        syy,
+        lines,
+        syy + 2.0 * suy + suu,
+        yy + 2.0 * uy + uu,
+        slowest / n,
+    )
+    weight = 0.5 * n * dt * _INDEPENDENT
+    least = floor * floor + _RELATIVE * _RELATIVE * uu
+    best = math.inf
+    for candidate in range(LOSS, SLOW + 1):
+        best = min(best, weight * math.log(max(left[candidate], 0.0) + least) + _COSTS[candidate])
+    # What is left of the effectiveness is not known better than the nominal effectiveness is.
+    without_loss = FLOATING if uy < -_ALL * uu else LOSS
+    held = FLOATING if abs(y + u) < (1.0 - _ALL) * math.sqrt(uu) else STUCK
+    names = (NO_KIND, without_loss, BIAS, held if suy < -_ALL * suu else WRONG, held, FLOATING, SLOW)
+    kind = NO_KIND
+    for candidate in range(LOSS, SLOW + 1):
+        score = weight * math.log(max(left[candidate], 0.0) + least) + _COSTS[candidate]
+        if score - best <= _CLEAR:
+            if kind != NO_KIND and kind != names[candidate]:
+                return NO_KIND
+            kind = names[candidate]
+    return kind

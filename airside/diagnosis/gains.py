@@ -29,7 +29,7 @@ class DiagnosisGains(NamedTuple):
     sd_effectiveness: Annotated[float, Q("sd_effectiveness", "-", "spread of effectiveness at an alarm", 0.6)]
     determined: Annotated[float, Q("determined", "-", "deviation below which effectiveness is determined", 0.1)]
     lasting: Annotated[float, Q("lasting", "s", "time that a navigation fault excuses alarms", 1.0)]
-    slip: Annotated[float, Q("slip", "rad/s", "mismatch of attitude and body rates of a navigation fault", 0.05)]
+    slip: Annotated[float, Q("slip", "rad/s", "mismatch of attitude and body rates of a navigation fault", 0.08)]
     patience: Annotated[float, Q("patience", "s", "time after which an alarm without a fault is taken back", 6.0)]
     pace: Annotated[float, Q("pace", "1/s", "fastest change of the effectiveness that the law is told", 2.0)]
     least: Annotated[float, Q("least", "-", "least effectiveness that the law is told", 0.2)]

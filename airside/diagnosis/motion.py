@@ -17,7 +17,7 @@ from typing import NamedTuple
 from ftcc.airside.attitude_model import body_rate_model, deflections_for
 from ftcc.airside.point_mass import drag
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST
-from ftcc.link.compiled import compiled
+from ftcc.link.compiled import compiled, store
 from ftcc.link.rotation import wrapped
 
 __all__ = ["Motion", "aircraft_motion", "kinematic_slips", "point_motion"]
@@ -40,13 +40,15 @@ class Motion(NamedTuple):
     """R: the part of the drift that is proportional to the least certain coefficient, unit."""
     air: float
     """Motion that comes with an unexplained turn of the flight path, unit times s per rad."""
+    lift: float
+    """Turn of the flight path by the actuator itself, rad/s per unit."""
     noise: float
     """Standard deviation of measured motion, unit times s."""
 
 
 @compiled
-def _set(row, step, drift, regressor, air, noise):
-    row[0], row[1], row[2], row[3], row[4] = step, drift, regressor, air, noise
+def _set(row, step, drift, regressor, air, lift, noise):
+    store(Motion(step, drift, regressor, air, lift, noise), row)
 
 
 @compiled
@@ -57,7 +59,7 @@ def _between(before, after):
 
 @compiled
 def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
-    """Write the `Motion` of the four actuators into ``out`` (4, 5); return the unexplained turn of the path, rad.
+    """Write the `Motion` of the four actuators into ``out`` (4, 6); return the unexplained turn of the path, rad.
 
     ``own`` and ``past`` are `Own` now and a tick before, ``positions`` (4,) the actuators between by the nominal model,
     ``a`` the `Model`. Aileron and rudder are written with ``lateral`` = 1.
@@ -88,6 +90,7 @@ def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
         (-resistance / a.m - a.g * sg) / per_newton,
         -resistance / a.m / per_newton,
         tilted / slope / per_newton,
+        0.0,
         gains.sd_speed / per_newton,
     )
     # Surfaces.
@@ -100,6 +103,7 @@ def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
         drift[1] / per_rad,
         moment * alpha / per_rad,
         moment / slope / per_rad,
+        force * a.CLde * cm / momentum,
         abs(gains.sd_rate / per_rad),
     )
     if lateral == 1:
@@ -110,8 +114,8 @@ def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
         yawing = force * a.b * a.Cnb * beta
         damped = deflections_for(effect, (a.Iz / inertia * rolling, 0.0, a.Ixz / inertia * rolling))
         vaned = deflections_for(effect, (a.Ixz / inertia * yawing, 0.0, a.Ix / inertia * yawing))
-        _set(out[AILERON], step[0], bare[0], damped[0], 0.0, abs(gains.sd_rate / effect[0][0]))
-        _set(out[RUDDER], step[2], bare[2], vaned[2], 0.0, abs(gains.sd_rate / effect[2][2]))
+        _set(out[AILERON], step[0], bare[0], damped[0], 0.0, 0.0, abs(gains.sd_rate / effect[0][0]))
+        _set(out[RUDDER], step[2], bare[2], vaned[2], 0.0, 0.0, abs(gains.sd_rate / effect[2][2]))
     return turn
 
 
@@ -128,16 +132,18 @@ def point_motion(own, past, positions, a, gains, dt, bank_lag, out):
         -resistance - a.m * a.g * math.sin(gamma),
         -resistance,
         0.0,
+        0.0,
         a.m * gains.sd_speed,
     )
     upright = cm if abs(cm) > _LEAST_COSINE else math.copysign(_LEAST_COSINE, cm)
     per_load = a.g * upright / V
-    _set(out[ELEVATOR], (own.gamma - past.gamma) / per_load, -cg / upright, 0.0, 0.0, abs(gains.sd_angle / per_load))
+    step = (own.gamma - past.gamma) / per_load
+    _set(out[ELEVATOR], step, -cg / upright, 0.0, 0.0, 0.0, abs(gains.sd_angle / per_load))
     if bank_lag > 0.0:
-        _set(out[AILERON], wrapped(own.mu - past.mu) / bank_lag, -mu, 0.0, 0.0, gains.sd_angle / bank_lag)
+        _set(out[AILERON], wrapped(own.mu - past.mu) / bank_lag, -mu, 0.0, 0.0, 0.0, gains.sd_angle / bank_lag)
     else:
         # The bank is the actuator itself: its motion is its mean position.
-        _set(out[AILERON], dt * mu, 0.0, 0.0, 0.0, dt * gains.sd_angle)
+        _set(out[AILERON], dt * mu, 0.0, 0.0, 0.0, 0.0, dt * gains.sd_angle)
     return 0.0
 
 

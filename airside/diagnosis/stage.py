@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.diagnosis.arrays import Memory, Trial
+from ftcc.airside.diagnosis.arrays import RECENT, Memory, Trial
 from ftcc.airside.diagnosis.beliefs import (
     FAULTY,
     HEALTHY,
     NO_KIND,
-    SLOW,
     SUSPECTED,
     UNDETERMINED,
     Belief,
 )
-from ftcc.airside.diagnosis.decision import SLUGGISH, agreeing, forget, gather, kind_of, lags, sum_up
+from ftcc.airside.diagnosis.decision import agreeing, follow, gather, kind_of, sum_up
 from ftcc.airside.diagnosis.estimator import RHO, B, C, Y, correct, predict, widen
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.diagnosis.health import set_health
 from ftcc.airside.diagnosis.motion import Motion, aircraft_motion, kinematic_slips, point_motion
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
-from ftcc.link.actuators import ACTUATORS, AILERON
-from ftcc.link.compiled import compiled, copy, fields, store
+from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR, THRUST
+from ftcc.link.compiled import compiled, copy, fields, fill, store
 
 __all__ = ["diagnose"]
 
 _COMMAND = Own._fields.index("aileron")
 """Index of the first command in `Own`."""
 _ACTUATORS = len(ACTUATORS)
-_POSITION, _RATE, _SLOW_POSITION = (Trial._fields.index(name) for name in ("position", "rate", "slow_position"))
-_EXCUSED = Memory._fields.index("excused_until")
+_POSITION, _RATE, _FILTERED = (Trial._fields.index(name) for name in ("position", "rate", "filtered"))
 _DRIFT, _LIMIT, _SPREAD = (DiagnosisGains._fields.index(f"{word}_thrust") for word in ("drift", "limit", "spread"))
 """Indices of the first of each kind of threshold; their order is thrust, elevator, aileron, rudder, load, bank."""
 _OF_SURFACES = (2, 1, 3, 0)
@@ -38,7 +36,7 @@ _OF_SURFACES = (2, 1, 3, 0)
 _OF_POINT = (5, 4, 3, 0)
 """and to a point mass."""
 
-_SLIP_BANDWIDTH = 10.0
+_SLIP_BANDWIDTH = 4.0
 """Of the observers of the kinematics, rad/s."""
 _OUTLIER = 8.5
 """A step beyond this many standard deviations of noise, and what full travel gives, is none of an aircraft."""
@@ -48,8 +46,27 @@ _SETTLING = 2.0
 """Time after the first tick without alarms, s."""
 _LEARNS_AT_LEAST = 0.3
 """Shortest time constant of what the observers learn to expect, s."""
-_APART = 0.3
-"""Time after which a disturbance of the flight path is learned, s."""
+_APART = 0.2
+"""Time constant of the mean that shows a disturbance of the flight path, s."""
+_GUSTY = 2.0
+"""How many standard deviations the air may move an aircraft."""
+_FAR_APART = 1.2
+"""Size of one that is learned at once, in drifts."""
+_BENDS = 3.0
+"""Time constant with which others are learned, s."""
+_UNSURE = 1.0
+"""How many standard deviations a coefficient may be off without an alarm."""
+_RECENT = 1.5
+"""Time constant of recent means, s."""
+_CLEAR = 4.0
+"""Beyond this many of its mean size a residual is not learned from."""
+_PRIOR = 0.3
+"""Weight of the nominal share of the air, in drifts."""
+_LEAST_SHARE, _MOST_SHARE = 0.4, 1.8
+_LEAST_KEPT = 0.3
+"""Guard of the effectiveness of a healthy actuator."""
+_LEAST_ALONE = 0.3
+"""Guard of the share of an actuator's motion that the flight path does not follow."""
 _STEADY = 0.15
 """Time for which data must speak for the same kind, s."""
 _WATCHED = 1.0
@@ -72,6 +89,7 @@ def diagnose(autopilots, i, now_us, dt):
         _begin(d, i, row, now)
     else:
         _compare(autopilots, i, gains, memory, now, dt)
+        d.recent_at[i] += 1
         set_health(autopilots, i, gains)
     copy(row, before)
     _show(autopilots, i)
@@ -79,10 +97,10 @@ def diagnose(autopilots, i, now_us, dt):
 
 @compiled
 def _begin(d, i, row, now):
-    store(Memory(now, 0.0, 0.0, 0.0, -math.inf), d.memory[i])
+    store(Memory(now, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.inf), d.memory[i])
     for slot in range(_ACTUATORS):
         d.trial[i, slot, _POSITION] = row[_COMMAND + slot]
-        d.trial[i, slot, _SLOW_POSITION] = row[_COMMAND + slot]
+        d.trial[i, slot, _FILTERED] = row[_COMMAND + slot]
 
 
 @compiled
@@ -105,15 +123,20 @@ def _positions(d, i, past, dt, mean):
             position = target + (position - target) * decay
         mean[slot] = middle
         trial[_POSITION], trial[_RATE] = position, rate
-        trial[_SLOW_POSITION] += dt / SLUGGISH * (position - trial[_SLOW_POSITION])
 
 
 @compiled
 def _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now):
-    """Watch the navigation solution; whether this tick's step is worth nothing.
+    """Watch the navigation solution: whether this tick's step is worth nothing, and the observers of the kinematics.
 
     A solution that is held repeats itself to the last bit; one that fails jumps as no actuator makes an aircraft jump,
     or its parts contradict each other.
+
+    Returns
+    -------
+    worthless : bool
+    bank, alpha, beta, until : float
+        See `Memory`.
     """
     held = own.q == past.q and own.theta == past.theta and own.p == past.p and own.r == past.r
     held = held or (own.V == past.V and own.gamma == past.gamma and own.chi == past.chi)
@@ -135,8 +158,7 @@ def _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now):
         until = now + gains.lasting
     elif held:
         until = max(until, now + 0.2 * gains.lasting)
-    store(Memory(memory.begun_at, bank, alpha, beta, until), d.memory[i])
-    return jumped or held
+    return jumped or held, bank, alpha, beta, until
 
 
 @compiled
@@ -151,18 +173,50 @@ def _compare(autopilots, i, gains, memory, now, dt):
         turn = point_motion(own, past, positions, model, gains, dt, d.lag[i, AILERON], d.motion[i])
     else:
         turn = aircraft_motion(own, past, positions, model, gains, dt, d.has[i, AILERON], d.motion[i])
-    worthless = _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now)
-    excused = now <= d.memory[i, _EXCUSED] or now < memory.begun_at + _SETTLING
+    worthless, bank, alpha, beta, until = _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now)
+    elapsed = now - memory.begun_at
+    # The flight path, that air and disturbances move.
+    unexplained = 0.0 if worthless else turn - dt * memory.path_base
+    path = (1.0 - min(gains.bandwidth * dt, 1.0)) * memory.path + unexplained
+    path_residual = gains.bandwidth * path
+    base = memory.path_base
+    mean = memory.path_mean + dt / _RECENT * (path_residual - memory.path_mean)
+    excused = now <= until or elapsed < _SETTLING
     for slot in range(_ACTUATORS):
         if d.has[i, slot] == 1:
             first = _OF_POINT[slot] if d.point[i] == 1 else _OF_SURFACES[slot]
             thresholds = (d.gains[i, _DRIFT + first], d.gains[i, _LIMIT + first], d.gains[i, _SPREAD + first])
-            _try(d, i, slot, gains, thresholds, turn, worthless, excused, now, now - memory.begun_at, dt)
+            moved = (unexplained, path_residual, path_residual - mean)
+            bent = _try(d, i, slot, gains, thresholds, moved, worthless, excused, now, elapsed, dt)
+            if slot == ELEVATOR:
+                base, mean, path = base + bent, mean - bent, path - bent / gains.bandwidth
+    store(Memory(memory.begun_at, path, base, mean, bank, alpha, beta, until), d.memory[i])
 
 
 @compiled
-def _try(d, i, slot, gains, thresholds, turn, worthless, excused, now, elapsed, dt):
-    """One actuator: residuals, estimate, decision."""
+def _share_of_air(trial, residual, path_residual, noise, drift, memory, learns, dt):
+    """How much of what the flight path says of the air is in the motion, how strong that is, and the sums of both.
+
+    An adaptive noise canceller of one weight (Widrow and others, Proc. IEEE 63, 1975), by recursive least squares from
+    the nominal 1 on: the nominal coefficients of moment and lift need not fit each other. ``noise`` is the standard
+    deviation of ``path_residual`` in still air.
+    """
+    square, product = trial.air_square, trial.air_product
+    if learns and abs(path_residual) < _CLEAR * math.sqrt(square + drift * drift):
+        square += dt / memory * (path_residual * path_residual - square)
+        product += dt / memory * (path_residual * residual - product)
+    prior = (_PRIOR * drift) * (_PRIOR * drift)
+    share = (product + prior) / (max(square - noise * noise, 0.0) + prior)
+    return min(max(share, _LEAST_SHARE), _MOST_SHARE), math.sqrt(max(square - noise * noise, 0.0)), square, product
+
+
+@compiled
+def _try(d, i, slot, gains, thresholds, moved, worthless, excused, now, elapsed, dt):
+    """One actuator: residuals, estimate, decision; the turn of the path that neither air nor actuator made, rad/s.
+
+    ``moved`` is what of the flight path's motion is unexplained in this tick, rad, its residual, and that less its
+    recent mean, rad/s.
+    """
     drift, limit, spread = thresholds
     trial, motion = fields(Trial, d.trial[i, slot]), fields(Motion, d.motion[i, slot])
     belief = fields(Belief, d.belief[i, slot])
@@ -171,66 +225,94 @@ def _try(d, i, slot, gains, thresholds, turn, worthless, excused, now, elapsed, 
     alarmed = belief.state >= UNDETERMINED
 
     # Residuals of what is believed.
-    by_itself = motion.drift + x[C] * motion.regressor + x[RHO] * position
-    step, calm_step = motion.step, motion.step - motion.air * turn
-    expected = by_itself + trial.direct_base + x[B] - trial.kept_bias
-    if worthless:
-        step, calm_step = dt * expected, dt * (by_itself + x[B])
+    expected = motion.drift + x[C] * motion.regressor + x[RHO] * position + trial.direct_base + x[B] - trial.kept_bias
     kept = 1.0 - min(gains.bandwidth * dt, 1.0)
-    direct = kept * trial.direct + step - dt * expected
-    calm = kept * trial.calm + calm_step - dt * (by_itself + x[B])
-    residual, calm_residual = gains.bandwidth * direct, gains.bandwidth * calm
+    direct = kept * trial.direct + (0.0 if worthless else motion.step - dt * expected)
+    residual = gains.bandwidth * direct
+    direct_mean = trial.direct_mean + dt / _RECENT * (residual - trial.direct_mean)
+    noisy = motion.air * gains.sd_angle
+    share, gusts, square, product = _share_of_air(
+        trial, residual - direct_mean, motion.air * moved[2],
+        noisy * gains.bandwidth * math.sqrt(0.5 * gains.bandwidth * dt),
+        drift, gains.memory, not alarmed and not excused, dt,
+    )  # fmt: skip
+    alone = 1.0 / max(1.0 - share * motion.air * motion.lift, _LEAST_ALONE)
+    calm_residual = alone * (residual - share * motion.air * moved[1])
+
+    filtered = trial.filtered + min(gains.bandwidth * dt, 1.0) * (position - trial.filtered)
 
     # Estimate.
+    if worthless:
+        calm_step = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
+    else:
+        by_air = share * motion.air * moved[0]
+        modelled = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
+        calm_step = modelled + alone * (motion.step - by_air - modelled)
+    recent = d.recent[i, slot, d.recent_at[i] % RECENT]
+    recent[0], recent[1], recent[2], recent[3] = calm_step, motion.drift, motion.regressor, position
     predict(x, P, dt, calm_step, motion.drift, motion.regressor, position, spread)
-    noise = math.sqrt(motion.noise * motion.noise + motion.air * gains.sd_angle * motion.air * gains.sd_angle)
+    noise = alone * math.sqrt(motion.noise * motion.noise + share * noisy * share * noisy)
     if worthless:
         widen(P, Y, 2.0 * noise)
-    correct(x, P, noise, alarmed)
+    correct(x, P, noise, alarmed or slot != THRUST)
     if alarmed:
         widen(P, RHO, 0.05 * math.sqrt(dt / _DRIFTS))
         widen(P, B, drift * math.sqrt(dt / _DRIFTS))
     else:
         widen(P, B, drift * math.sqrt(dt / gains.memory))
     base, kept_effectiveness, kept_bias = trial.direct_base, trial.kept_effectiveness, trial.kept_bias
+    kept_sd = trial.kept_sd
+    learning = dt / min(gains.memory, elapsed + _LEARNS_AT_LEAST)
+    regressor_mean = trial.regressor_mean + learning * (motion.regressor - trial.regressor_mean)
     if not alarmed:
-        kept_effectiveness, kept_bias = x[RHO], x[B]
-        base += dt / min(gains.memory, elapsed + _LEARNS_AT_LEAST) * residual
+        base += learning * residual
 
-    # Test.
-    tested = agreeing(residual, calm_residual)
-    up = sum_up(trial.up, tested, drift, travel, dt)
-    down = sum_up(trial.down, -tested, drift, travel, dt)
+    # Test. What a wrong coefficient may do is not tested.
+    tolerated = drift + _UNSURE * gains.sd_coefficient * abs(motion.regressor - regressor_mean)
+    tested = agreeing(calm_residual, residual, _GUSTY * gusts)
+    up = sum_up(trial.up, tested, tolerated, travel, dt)
+    down = sum_up(trial.down, -tested, tolerated, travel, dt)
     if excused:
         up, down = 0.0, 0.0
     evidence = max(up, down) / limit
     quiet_at = now if evidence == 0.0 else trial.quiet_at
-    apart = trial.apart + dt if abs(calm_residual) > drift and abs(tested) < 0.5 * drift else 0.0
-    if apart > _APART and not alarmed:
-        widen(P, B, calm_residual)
-        apart = 0.0
+    if not alarmed and evidence == 0.0:
+        kept_effectiveness, kept_bias = x[RHO], x[B]
+        kept_sd = math.sqrt(max(P[RHO, RHO], 0.0))
+    # What only the flight path says is a disturbance of it: it is learned, at once where it is large.
+    apart = trial.apart + dt / _APART * (calm_residual - tested - trial.apart)
+    bent = 0.0
+    if motion.air != 0.0 and not worthless:
+        if abs(apart) > _FAR_APART * drift:
+            bent, apart = -apart / (share * motion.air), 0.0
+        else:
+            bent = -dt / min(_BENDS, elapsed + _LEARNS_AT_LEAST) * (calm_residual - tested) / (share * motion.air)
 
     # Decide.
     state, kind = belief.state, belief.kind
     suspected_at, detected_at, isolated_at = belief.suspected_at, belief.detected_at, belief.isolated_at
-    candidate, candidate_since = trial.candidate, trial.candidate_since
+    candidate, candidate_since, whole = trial.candidate, trial.candidate_since, trial.whole
     loss, bias = x[RHO] - kept_effectiveness, x[B] - kept_bias
     if evidence >= 1.0:
         if not alarmed:
             detected_at, suspected_at = now, quiet_at
+        quiet_before = quiet_at
         state, kind, isolated_at = UNDETERMINED, NO_KIND, math.nan
         candidate, candidate_since = NO_KIND, now
         up, down, quiet_at = 0.0, 0.0, now
-        widen(P, RHO, gains.sd_effectiveness)
-        widen(P, B, 0.5 * travel)
-        forget(sums)
+        if not alarmed:
+            x[RHO], x[B] = kept_effectiveness, kept_bias
+        since = now - max(quiet_before, detected_at - 1.0)
+        _begin_anew(d, i, slot, gains, x, P, 0.5 * travel, spread, noise, since, dt)
+        whole, filtered = _look_back(d, i, slot, trial, travel, gains, (kept_effectiveness, kept_bias), since, dt)
     elif not alarmed:
         state = SUSPECTED if evidence > 0.5 else HEALTHY
     else:
-        gather(sums, calm_residual + loss * position + bias, position, position - trial.slow_position, dt)
-        found = kind_of(loss, bias, P[RHO, RHO], P[B, B], x[RHO], 0.5 * drift)
-        if now - detected_at > _WATCHED and lags(sums, 0.2 * drift):
-            found = SLOW
+        healthy = motion.drift + kept_effectiveness * position + kept_bias
+        whole = kept * whole + calm_step - dt * healthy
+        gather(sums, gains.bandwidth * whole, filtered, dt)
+        follow(trial.slow, trial.lagging, trial.square, gains.bandwidth * whole, position, travel, gains.bandwidth, dt)
+        found = kind_of(sums, trial.square, 0.3 * drift, dt)
         if found != candidate:
             candidate, candidate_since = found, now
         elif found != NO_KIND and now - candidate_since >= _STEADY:
@@ -241,12 +323,18 @@ def _try(d, i, slot, gains, thresholds, turn, worthless, excused, now, elapsed, 
             state, kind = HEALTHY, NO_KIND
             detected_at, suspected_at, isolated_at = math.nan, math.nan, math.nan
             _forget_effectiveness(x, P, gains)
+    # Of the healthy actuator's effectiveness, which is not known better than the nominal coefficients are.
+    if state >= UNDETERMINED:
+        effectiveness = x[RHO] / max(kept_effectiveness, _LEAST_KEPT)
+        deviation = math.sqrt(max(P[RHO, RHO], 0.0) + effectiveness * kept_sd * effectiveness * kept_sd)
+    else:
+        effectiveness, deviation = 1.0, gains.sd_coefficient
     store(
         Belief(
             state=state,
             kind=kind,
-            effectiveness=x[RHO],
-            effectiveness_sd=math.sqrt(max(P[RHO, RHO], 0.0)),
+            effectiveness=effectiveness,
+            effectiveness_sd=deviation,
             bias=bias,
             bias_sd=math.sqrt(max(P[B, B], 0.0)),
             evidence=evidence,
@@ -261,23 +349,73 @@ def _try(d, i, slot, gains, thresholds, turn, worthless, excused, now, elapsed, 
             position=trial.position,
             rate=trial.rate,
             direct=direct,
-            calm=calm,
             direct_base=base,
+            direct_mean=direct_mean,
+            air_square=square,
+            air_product=product,
+            regressor_mean=regressor_mean,
             up=up,
             down=down,
             quiet_at=quiet_at,
             apart=apart,
             kept_effectiveness=kept_effectiveness,
+            kept_sd=kept_sd,
             kept_bias=kept_bias,
             candidate=candidate,
             candidate_since=candidate_since,
-            slow_position=trial.slow_position,
+            whole=whole,
+            filtered=filtered,
             sums=sums,
+            slow=trial.slow,
+            lagging=trial.lagging,
+            square=trial.square,
             x=x,
             P=P,
         ),
         d.trial[i, slot],
     )
+    return bent
+
+
+@compiled
+def _begin_anew(d, i, slot, gains, x, P, spread_bias, spread, noise, since, dt):
+    """Estimate the fault from its presumed onset, ``since`` s ago, on: with wide spreads of what it may be."""
+    last = d.recent_at[i]
+    ticks = min(int(since / dt) + 1, RECENT, last)
+    x[Y] = 0.0
+    for n in range(P.shape[0]):
+        P[Y, n], P[n, Y] = 0.0, 0.0
+    P[Y, Y] = 2.0 * noise * noise
+    widen(P, RHO, gains.sd_effectiveness)
+    widen(P, B, spread_bias)
+    for n in range(last - ticks + 1, last + 1):
+        row = d.recent[i, slot, n % RECENT]
+        predict(x, P, dt, row[0], row[1], row[2], row[3], spread)
+        correct(x, P, noise, True)
+
+
+@compiled
+def _look_back(d, i, slot, trial, travel, gains, kept, since, dt):
+    """Fill the sums that isolate a fault from its presumed onset, ``since`` s ago, on.
+
+    ``kept`` are effectiveness and additive effect of the healthy actuator. Returns the states of the two filters.
+    """
+    effectiveness, bias = kept
+    last = d.recent_at[i]
+    ticks = min(int(since / dt) + 1, RECENT, last)
+    first = last - ticks + 1
+    whole, filtered = 0.0, d.recent[i, slot, first % RECENT, 3]
+    fill(trial.sums, 0.0)
+    fill(trial.square, 0.0)
+    fill(trial.lagging, 0.0)
+    fill(trial.slow, filtered)
+    for n in range(first, last + 1):
+        row = d.recent[i, slot, n % RECENT]
+        whole = (1.0 - min(gains.bandwidth * dt, 1.0)) * whole + row[0] - dt * (row[1] + effectiveness * row[3] + bias)
+        filtered += min(gains.bandwidth * dt, 1.0) * (row[3] - filtered)
+        gather(trial.sums, gains.bandwidth * whole, filtered, dt)
+        follow(trial.slow, trial.lagging, trial.square, gains.bandwidth * whole, row[3], travel, gains.bandwidth, dt)
+    return whole, filtered
 
 
 @compiled
