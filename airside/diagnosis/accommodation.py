@@ -13,7 +13,7 @@ from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR, RUDDER, THRUST
-from ftcc.link.compiled import compiled, copy, fields
+from ftcc.link.compiled import compiled, compiled_apart, copy, fields
 
 __all__ = ["accommodate", "command_for", "is_told"]
 
@@ -37,7 +37,7 @@ def _towards(value, target, most):
     return value + min(max(target - value, -most), most)
 
 
-@compiled
+@compiled_apart
 def accommodate(autopilots, i, dt):
     """Bring what the law of UAV ``i`` is told of its actuators to this tick: after `diagnose`, before the law."""
     d = autopilots.diagnosis

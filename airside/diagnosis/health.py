@@ -9,7 +9,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.point_mass import drag
 from ftcc.link.actuators import ELEVATOR, THRUST
-from ftcc.link.compiled import compiled, copy, fields, store
+from ftcc.link.compiled import compiled, compiled_apart, copy, fields, store
 
 __all__ = ["climb_of_load", "climb_of_thrust", "set_health", "share_health"]
 
@@ -52,7 +52,7 @@ def share_health(autopilots, i):
         copy(d.health[i], autopilots.shared[i, d.shares[0] :])
 
 
-@compiled
+@compiled_apart
 def set_health(autopilots, i, gains):
     """Set ``Diagnosis.health`` of UAV ``i``; whether it belongs is decided elsewhere."""
     d = autopilots.diagnosis

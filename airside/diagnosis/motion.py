@@ -17,7 +17,7 @@ from typing import NamedTuple
 from ftcc.airside.attitude_model import body_rate_model, deflections_for
 from ftcc.airside.point_mass import drag
 from ftcc.link.actuators import AILERON, ELEVATOR, RUDDER, THRUST
-from ftcc.link.compiled import compiled, store
+from ftcc.link.compiled import compiled, compiled_apart, store
 from ftcc.link.rotation import wrapped
 
 __all__ = ["Motion", "aircraft_motion", "kinematic_slips", "point_motion"]
@@ -57,7 +57,7 @@ def _between(before, after):
     return before + 0.5 * wrapped(after - before)
 
 
-@compiled
+@compiled_apart
 def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
     """Write the `Motion` of the four actuators into ``out`` (4, 6); return the unexplained turn of the path, rad.
 
@@ -119,7 +119,7 @@ def aircraft_motion(own, past, positions, a, gains, dt, lateral, out):
     return turn
 
 
-@compiled
+@compiled_apart
 def point_motion(own, past, positions, a, gains, dt, bank_lag, out):
     """As `aircraft_motion`, of a point mass; ``bank_lag`` is the bandwidth of its bank, rad/s; 0: it has none."""
     V = max(0.5 * (own.V + past.V), _LEAST_AIRSPEED)

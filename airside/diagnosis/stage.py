@@ -21,7 +21,7 @@ from ftcc.airside.diagnosis.motion import Motion, aircraft_motion, kinematic_sli
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR, THRUST
-from ftcc.link.compiled import compiled, copy, fields, fill, store
+from ftcc.link.compiled import compiled, compiled_apart, copy, fields, fill, store
 
 __all__ = ["diagnose"]
 
@@ -75,7 +75,7 @@ _DRIFTS = 5.0
 """Time constant with which a known fault may change, s."""
 
 
-@compiled
+@compiled_apart
 def diagnose(autopilots, i, now_us, dt):
     """Bring beliefs and health of UAV ``i`` to this tick; ``dt`` is the control period, s."""
     d = autopilots.diagnosis
@@ -161,7 +161,7 @@ def _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now):
     return jumped or held, bank, alpha, beta, until
 
 
-@compiled
+@compiled_apart
 def _compare(autopilots, i, gains, memory, now, dt):
     """Compare what the aircraft did with what it should have done, actuator by actuator."""
     d = autopilots.diagnosis
@@ -210,7 +210,7 @@ def _share_of_air(trial, residual, path_residual, noise, drift, memory, learns, 
     return min(max(share, _LEAST_SHARE), _MOST_SHARE), math.sqrt(max(square - noise * noise, 0.0)), square, product
 
 
-@compiled
+@compiled_apart
 def _try(d, i, slot, gains, thresholds, moved, worthless, excused, now, elapsed, dt):
     """One actuator: residuals, estimate, decision; the turn of the path that neither air nor actuator made, rad/s.
 
@@ -377,7 +377,7 @@ def _try(d, i, slot, gains, thresholds, moved, worthless, excused, now, elapsed,
     return bent
 
 
-@compiled
+@compiled_apart
 def _begin_anew(d, i, slot, gains, x, P, spread_bias, spread, noise, since, dt):
     """Estimate the fault from its presumed onset, ``since`` s ago, on: with wide spreads of what it may be."""
     last = d.recent_at[i]
@@ -394,7 +394,7 @@ def _begin_anew(d, i, slot, gains, x, P, spread_bias, spread, noise, since, dt):
         correct(x, P, noise, True)
 
 
-@compiled
+@compiled_apart
 def _look_back(d, i, slot, trial, travel, gains, kept, since, dt):
     """Fill the sums that isolate a fault from its presumed onset, ``since`` s ago, on.
 
