@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.diagnosis.arrays import Diagnosis, new_diagnosis
 from ftcc.airside.diagnosis.beliefs import HEALTH_SHARED, belief_signals
+from ftcc.airside.diagnosis.cooperation_arrays import Cooperation, new_cooperation
 from ftcc.airside.flight_path import Own
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
@@ -58,7 +59,7 @@ class Autopilots(NamedTuple):
     model: NDArray[np.float64]
     """(k, n): see `Model`."""
     weight: NDArray[np.float64]
-    """(k, n): a_ij of the in-edges."""
+    """(k, n): a_ij of the in-edges; less of those who have left."""
     leader: NDArray[np.int64]
     """(k,): 1 for a leader."""
     command: NDArray[np.float64]
@@ -96,8 +97,9 @@ class Autopilots(NamedTuple):
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
     diagnosis: Diagnosis
+    cooperation: Cooperation
     events: EventList
-    """What leaders have to report, see `leader.drain_leader_events`."""
+    """What leaders, and UAVs that leave, have to report, see `leader.drain_leader_events`."""
 
 
 class _Profiles(NamedTuple):
@@ -208,6 +210,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         mode=np.full(k, MISSION),
         held_us=np.zeros(k, np.int64),
         diagnosis=diagnosis,
+        cooperation=new_cooperation(specs, scheme.plant, weight, profiles.parameters, shared_width),
         events=new_events(),
     )
     return autopilots, inbox

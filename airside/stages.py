@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_told
+from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, is_apart, refer_apart
 from ftcc.airside.diagnosis.health import share_health
 from ftcc.airside.diagnosis.stage import diagnose as _diagnose
 from ftcc.airside.flight_path import Own, decode_state
@@ -61,6 +62,9 @@ _LARGEST = 1e30
 
 @compiled
 def _heard_by(autopilots, inbox, i):
+    if hears_virtual_leader(autopilots, i):
+        c = autopilots.cooperation
+        return Heard(c.records[i], c.edges[i, 0], c.edges[i, 1], c.edges[i, 2])
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
     return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
 
@@ -122,12 +126,17 @@ def refer(autopilots, inbox, i, now_us, period_us):
     To be called once at every tick, after `hear`: a profile may wait for the position of another leader. In hold
     it stands still.
     """
+    if autopilots.diagnosis.cooperates[i] == 1:
+        cooperate(autopilots, inbox, i, now_us, period_us / 1e6)
     if autopilots.leader[i] == 1:
         advance_leader(autopilots, inbox, i, now_us, period_us)
         return
     if autopilots.mode[i] == HOLD:
         if _stand(autopilots.reference[i], period_us):
             autopilots.held_us[i] += period_us
+        return
+    if is_apart(autopilots, i):
+        refer_apart(autopilots, inbox, i, now_us, period_us)
         return
     parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
     _refer(parameters, commands, autopilots.reference[i], now_us - autopilots.held_us[i], period_us)

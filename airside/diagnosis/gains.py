@@ -18,7 +18,7 @@ Q = Quantity
 
 
 class DiagnosisGains(NamedTuple):
-    """Settings of the stage `diagnose`, then those of each actuator."""
+    """Settings of the stage `diagnose`, then those of each actuator, then those by which the swarm makes room."""
 
     bandwidth: Annotated[float, Q("bandwidth", "rad/s", "of the observers whose residuals are tested", 20.0)]
     memory: Annotated[float, Q("memory", "s", "time in which a change that raised no alarm is learned", 30.0)]
@@ -53,20 +53,32 @@ class DiagnosisGains(NamedTuple):
     spread_rudder: Annotated[float, Q("spread_rudder", "rad sqrt(s)", "likewise", 0.008)]
     spread_load_factor: Annotated[float, Q("spread_load_factor", "sqrt(s)", "likewise", 0.01)]
     spread_bank: Annotated[float, Q("spread_bank", "rad sqrt(s)", "likewise", 0.01)]
+    fresh: Annotated[float, Q("fresh", "s", "age beyond which a neighbour's health is unknown", 2.0)]
+    silent: Annotated[float, Q("silent", "s", "age beyond which leaders make no room for a follower", 20.0)]
+    room: Annotated[float, Q("room", "-", "share of the weakest follower's climb rate that leaders use", 0.8)]
+    room_pace: Annotated[float, Q("room_pace", "m/s^2", "fastest change of the leaders' limits", 0.2)]
+    least_climb: Annotated[float, Q("least_climb", "m/s", "climb rate below which a faulty UAV leaves", 0.2)]
+    astray: Annotated[float, Q("astray", "m", "distance from its place beyond which a faulty UAV leaves", 8.0)]
+    astray_angle: Annotated[float, Q("astray_angle", "rad", "likewise, error of its attitude", 0.3)]
+    leaving: Annotated[float, Q("leaving", "s", "time after which it leaves", 3.0)]
+    returning: Annotated[float, Q("returning", "s", "time after which one that is healthy again comes back", 5.0)]
+    fading: Annotated[float, Q("fading", "s", "time in which an edge fades out of the sums, or in", 3.0)]
 
 
 _BY_ACTUATOR = ["thrust", "elevator", "aileron", "rudder", "load_factor", "bank"]
 
 DIAGNOSIS_RANGES = {
     ranges.FREQUENCY: "bandwidth dither_frequency",
-    ranges.FILTER_TIME: "memory lasting patience",
+    ranges.FILTER_TIME: "memory lasting patience fresh silent leaving returning fading",
     ranges.LIMIT: " ".join(
         [
             "sd_speed sd_angle sd_rate sd_coefficient sd_effectiveness determined slip pace",
+            "room_pace astray astray_angle",
             *(f"{word}_{name}" for word in ("drift", "limit", "spread") for name in _BY_ACTUATOR),
         ]
     ),
-    ranges.SHARE: "least dither",
+    ranges.LIMIT_OR_OFF: "least_climb",
+    ranges.SHARE: "least dither room",
 }
 
 

@@ -9,9 +9,18 @@ from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import DiagnosisSpec
 from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.schema import Plan
+from ftcc.link.graph import Graph
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["diagnosis_of"]
+__all__ = ["diagnosis_of", "health_edges"]
+
+
+def health_edges(plan: Plan, graph: Graph) -> tuple[tuple[int, int], ...]:
+    """Return the edges (leader, follower) over which leaders hear of health alone: they have no part in the graph."""
+    if not (plan.diagnosis.on and plan.diagnosis.cooperate):
+        return ()
+    pairs = ((leader, follower) for leader in graph.leaders for follower in graph.followers)
+    return tuple(pair for pair in pairs if pair not in graph.weights)
 
 
 def diagnosis_of(

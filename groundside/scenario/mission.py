@@ -36,7 +36,7 @@ from ftcc.groundside.scenario.checks import (
     timing_of,
 )
 from ftcc.groundside.scenario.columns import leading_columns
-from ftcc.groundside.scenario.diagnosis import diagnosis_of
+from ftcc.groundside.scenario.diagnosis import diagnosis_of, health_edges
 from ftcc.groundside.scenario.faults import TrimDemand, check_fault_times, check_faults, trim_demands
 from ftcc.groundside.scenario.fire import check_posts
 from ftcc.groundside.scenario.laws import check_scheme, gains_of, initial_shared_values
@@ -152,7 +152,7 @@ def resolve(scenario: Scenario) -> Mission:
         flight, profiles = _prepare_guidance(plan, basis, vehicles, profiles, references, gains, findings)
     tolerant = _tolerant_gains(scenario, basis.scheme, gains, findings)
     channel = Channel(**plan.channel.model_dump())
-    changes = link_changes(plan.link_events, basis.graph, channel, findings.refuse)
+    changes = link_changes(plan.link_events, basis.graph, health_edges(plan, basis.graph), channel, findings.refuse)
     diagnosis = diagnosis_of(plan, basis.scheme, basis.plant, vehicles[0], _is_steered(basis), findings)
     check_delays(plan, basis.timing, findings)
     _check_recorded_columns(plan, basis, diagnosis, findings)
@@ -322,6 +322,7 @@ def _autopilots(
     graph, scheme = basis.graph, basis.scheme
     initial = initial_shared_values(scheme, vehicles, profiles)
     steered = _is_steered(basis)
+    told = health_edges(plan, graph)
     return tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -335,8 +336,9 @@ def _autopilots(
             command=vehicle.command,
             travel=vehicle.travel,
             reference=references[vehicle.uav],
-            neighbours=tuple(
-                Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)
+            neighbours=(
+                *(Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)),
+                *(Neighbour(j, 0.0) for receiver, j in told if receiver == vehicle.uav),
             ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
@@ -345,7 +347,7 @@ def _autopilots(
             datum=vehicle.datum,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
             attitude_code=vehicle.attitude_code,
-            receivers=tuple(graph.receivers(vehicle.uav)),
+            receivers=(*graph.receivers(vehicle.uav), *(i for i, sender in told if sender == vehicle.uav)),
         )
         for vehicle in vehicles
     )
