@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ftcc.airside.diagnosis.beliefs import FAULTY, SENSOR, Belief
+from ftcc.airside.diagnosis.arrays import Trial
+from ftcc.airside.diagnosis.beliefs import FAULTY, SENSOR, UNDETERMINED, Belief
+from ftcc.airside.diagnosis.estimator import RHO, B
 from ftcc.airside.model import level_flight
 from ftcc.airside.point_mass import drag
 from ftcc.link.actuators import ELEVATOR, THRUST
 from ftcc.link.compiled import compiled, fields
 
-__all__ = ["Level", "level_alpha", "level_speed"]
+__all__ = ["Level", "end_of", "level_alpha", "level_speed"]
 
 _RESERVE = 0.1
 """Share of an actuator's travel that a safe flight leaves unused, at either end."""
+_KNOWN = 0.1
+"""Deviation of what an actuator does at an end of its travel, share of that, below which it is known."""
 _STEPS, _STEP = 20, 0.025
 """Speeds that are tried on either side of the wanted one, and their distance, shares of it."""
 _LARGEST_ALPHA = 0.2
@@ -31,14 +35,30 @@ class Level(NamedTuple):
 
 
 @compiled
-def _end(d, i, slot, limit):
-    """What an actuator does, rad or N, where its command is at ``limit``, by what is believed of it."""
+def end_of(d, i, slot, limit):
+    """What an actuator of UAV ``i`` does, rad or N, at the command ``limit``, and whether data say so.
+
+    While a fault is undetermined its effect at an end of the travel may be known all the same: where the actuator has
+    been there, effectiveness and additive effect are uncertain, but not what they do together. Without word from the
+    data it does what is asked.
+    """
     if d.belief.shape[1] == 0 or d.has[i, slot] == 0:
-        return limit
+        return limit, False
     belief = fields(Belief, d.belief[i, slot])
-    if belief.state != FAULTY or belief.kind >= SENSOR:
-        return limit
-    return belief.effectiveness * limit + belief.bias
+    if belief.state < UNDETERMINED or belief.kind >= SENSOR:
+        return limit, False
+    if belief.state != FAULTY:
+        P = fields(Trial, d.trial[i, slot]).P
+        variance = limit * limit * P[RHO, RHO] + 2.0 * limit * P[RHO, B] + P[B, B]
+        if not variance < _KNOWN * _KNOWN * limit * limit:
+            return limit, False
+    return belief.effectiveness * limit + belief.bias, True
+
+
+@compiled
+def _end(d, i, slot, limit):
+    value, _ = end_of(d, i, slot, limit)
+    return value
 
 
 @compiled

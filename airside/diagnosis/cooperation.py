@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.diagnosis.apart import fly_apart, place
-from ftcc.airside.diagnosis.beliefs import FAULTY, MOST_CLIMB, SUSPECTED, UNDETERMINED, Health
+from ftcc.airside.diagnosis.beliefs import MOST_CLIMB, SUSPECTED, UNDETERMINED, Health
 from ftcc.airside.diagnosis.cooperation_arrays import ATTITUDE, LONGITUDINAL, Apart, Neighbour
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.elements.vectors import turned
 from ftcc.airside.flight_path import Own
 from ftcc.airside.references import attitude, longitudinal, position
-from ftcc.airside.references.profiles.arrays import ProfileParameters
+from ftcc.airside.references.profiles import CLIMB_LIMIT, SINK_LIMIT
 from ftcc.link.channel import Edge
 from ftcc.link.compiled import compiled, copy, fields
 from ftcc.link.events import note
@@ -43,7 +43,8 @@ _KNOWN, _HEARD = Neighbour._fields.index("known"), 1
 _WEAK_FOR, _SOUND_FOR, _BEGUN, _JOINS, _LIMIT = (
     Apart._fields.index(name) for name in ("weak_for", "sound_for", "begun", "joins", "limit")
 )
-_CLIMB_LIMIT, _SINK_LIMIT = (ProfileParameters._fields.index(name) for name in ("climb_limit", "sink_limit"))
+_ENOUGH = 1.2
+"""Climb rate of the weakest follower, over the leader's own limit, from which on it is not held back any more."""
 _Z, _Z_DOT = (longitudinal.Reference._fields.index(name) for name in ("z", "z_dot"))
 _SENDER = Edge._fields.index("sender")
 _NEIGHBOUR_BELONGS = Neighbour._fields.index("belongs")
@@ -128,10 +129,10 @@ def _make_room(autopilots, inbox, i, gains, now_us, dt):
         climb = gains.room * neighbour.climb_left
         if neighbour.climb_left < MOST_CLIMB and climb < least:
             least, weakest = climb, inbox.edges[i, edge, _SENDER]
-    own = max(c.limits[i, 0], c.limits[i, 1])
-    if least >= own:
-        least = math.inf
     limit, step = c.apart[i, _LIMIT], gains.room_pace * dt
+    own = max(c.limits[i, 0], c.limits[i, 1])
+    if least >= own * (1.0 if limit == math.inf else _ENOUGH):
+        least = math.inf
     if least < limit:
         if limit == math.inf:
             note(autopilots.events, now_us, i, ROOM, weakest)
@@ -140,12 +141,12 @@ def _make_room(autopilots, inbox, i, gains, now_us, dt):
         limit = max(least, min(limit, max(present, least)) - step)
     elif least > limit:
         limit = min(limit + step, least)
-        if limit >= min(own, MOST_CLIMB):
+        if least == math.inf and limit >= min(own, MOST_CLIMB):
             limit = math.inf
             note(autopilots.events, now_us, i, NO_ROOM, 0)
     c.apart[i, _LIMIT] = limit
-    autopilots.profile[i, _CLIMB_LIMIT] = min(c.limits[i, 0], limit)
-    autopilots.profile[i, _SINK_LIMIT] = min(c.limits[i, 1], limit)
+    autopilots.profile[i, CLIMB_LIMIT] = min(c.limits[i, 0], limit)
+    autopilots.profile[i, SINK_LIMIT] = min(c.limits[i, 1], limit)
 
 
 @compiled
@@ -175,8 +176,7 @@ def _decide(autopilots, inbox, i, gains, now_us, dt):
         row[_JOINS] = 1.0 if row[_SOUND_FOR] > gains.returning else 0.0
         return
     # A law of attitude climbs by nobody's wish.
-    cannot = health.state == FAULTY and health.climb_left < gains.least_climb
-    weak = cannot and autopilots.cooperation.kind[0] != ATTITUDE
+    weak = health.climb_left < gains.least_climb and autopilots.cooperation.kind[0] != ATTITUDE
     weak = weak or (health.state >= UNDETERMINED and _off_its_place(autopilots, inbox, i, gains) > 1.0)
     row[_WEAK_FOR] = row[_WEAK_FOR] + dt if weak else 0.0
     if row[_WEAK_FOR] > gains.leaving:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.diagnosis.beliefs import Health, new_health
 from ftcc.airside.references import longitudinal
-from ftcc.airside.references.profiles.arrays import ProfileParameters
+from ftcc.airside.references.profiles import CLIMB_LIMIT, SINK_LIMIT
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import width
 
@@ -20,8 +20,6 @@ __all__ = ["ATTITUDE", "LONGITUDINAL", "POSITION", "Apart", "Cooperation", "Neig
 _PLANTS = ("longitudinal", "attitude", "position")
 LONGITUDINAL, ATTITUDE, POSITION = range(len(_PLANTS))
 """What a UAV's own reference is, see ``airside.references``."""
-
-_CLIMB_LIMIT, _SINK_LIMIT = (ProfileParameters._fields.index(name) for name in ("climb_limit", "sink_limit"))
 
 
 class Neighbour(NamedTuple):
@@ -117,7 +115,7 @@ def new_cooperation(
         share=np.ones((k, n)),
         weight=weight.copy(),
         apart=apart,
-        limits=profile[:, [_CLIMB_LIMIT, _SINK_LIMIT]].copy(),
+        limits=profile[:, [CLIMB_LIMIT, SINK_LIMIT]].copy(),
         speed=np.array([spec.reference.initial[speed] if kind == LONGITUDINAL else math.nan for spec in specs]),
         lone=np.zeros((k, len(longitudinal.Reference._fields))),
         level=level,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ftcc.airside.diagnosis.ability import end_of
 from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, MOST_CLIMB, SENSOR, Belief, Health
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
@@ -36,10 +37,9 @@ def climb_of_load(load_factor):
 
 
 @compiled
-def _largest_load(V, effectiveness, bias, a):
-    """Largest load factor that the elevator can trim, eqs. (2.6)-(2.7) at rest."""
+def _largest_load(V, acting, a):
+    """Largest load factor that an elevator trims whose stroke ends at ``acting`` (rad), eqs. (2.6)-(2.7) at rest."""
     force = 0.5 * a.rho * V * V * a.S
-    acting = effectiveness * a.elevator_min + bias
     alpha = -(a.Cm0 + a.Cmde * acting) / a.Cma
     return force * (a.CL0 + a.CLa * alpha + a.CLde * acting) / (a.m * a.g)
 
@@ -64,19 +64,16 @@ def set_health(autopilots, i, gains):
             continue
         belief = fields(Belief, d.belief[i, slot])
         state = max(state, int(belief.state))
-        if belief.state != FAULTY or belief.kind >= SENSOR:
-            continue
-        least = min(least, min(max(belief.effectiveness, 0.0), 1.0))
+        if belief.state == FAULTY and belief.kind < SENSOR:
+            least = min(least, min(max(belief.effectiveness, 0.0), 1.0))
         if slot == THRUST:
-            most = belief.effectiveness * model.thrust_max + belief.bias
-            if d.point[i] == 1:
+            most, known = end_of(d, i, slot, model.thrust_max)
+            if known and d.point[i] == 1:
                 climb = min(climb, max((most - drag(V, 1.0, model)) * V / (model.m * model.g), 0.0))
-            else:
+            elif known:
                 climb = min(climb, max(climb_of_thrust(V, own.gamma, own.alpha, most, model), 0.0))
         elif slot == ELEVATOR:
-            if d.point[i] == 1:
-                load = belief.effectiveness * d.travel[i, slot] + belief.bias
-            else:
-                load = _largest_load(V, belief.effectiveness, belief.bias, model)
-            climb = min(climb, climb_of_load(load))
+            most, known = end_of(d, i, slot, d.travel[i, slot] if d.point[i] == 1 else model.elevator_min)
+            if known:
+                climb = min(climb, climb_of_load(most if d.point[i] == 1 else _largest_load(V, most, model)))
     store(Health(float(state), least, climb, d.health[i, _BELONGS]), d.health[i])
