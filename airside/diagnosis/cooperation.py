@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.diagnosis.apart import fly_apart, place
-from ftcc.airside.diagnosis.beliefs import MOST_CLIMB, SUSPECTED, UNDETERMINED, Health
+from ftcc.airside.diagnosis.beliefs import FAULTY, MOST_CLIMB, SUSPECTED, UNDETERMINED, Health
 from ftcc.airside.diagnosis.cooperation_arrays import ATTITUDE, LONGITUDINAL, Apart, Neighbour
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.elements.vectors import turned
@@ -45,6 +45,8 @@ _WEAK_FOR, _SOUND_FOR, _BEGUN, _JOINS, _LIMIT = (
 )
 _ENOUGH = 1.2
 """Climb rate of the weakest follower, over the leader's own limit, from which on it is not held back any more."""
+_AS_NEW = 0.9
+"""Effectiveness from which on a UAV may come back."""
 _Z, _Z_DOT = (longitudinal.Reference._fields.index(name) for name in ("z", "z_dot"))
 _SENDER = Edge._fields.index("sender")
 _NEIGHBOUR_BELONGS = Neighbour._fields.index("belongs")
@@ -172,7 +174,9 @@ def _decide(autopilots, inbox, i, gains, now_us, dt):
     d, row = autopilots.diagnosis, autopilots.cooperation.apart[i]
     health = fields(Health, d.health[i])
     if health.belongs == 0.0:
-        row[_SOUND_FOR] = row[_SOUND_FOR] + dt if health.state <= SUSPECTED else 0.0
+        able = health.effectiveness >= _AS_NEW and health.climb_left >= MOST_CLIMB
+        sound = health.state <= SUSPECTED or (health.state == FAULTY and able)
+        row[_SOUND_FOR] = row[_SOUND_FOR] + dt if sound else 0.0
         row[_JOINS] = 1.0 if row[_SOUND_FOR] > gains.returning else 0.0
         return
     # A law of attitude climbs by nobody's wish.
