@@ -18,7 +18,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.references import attitude, longitudinal, position
 from ftcc.airside.references.profiles import CLIMB_LIMIT, SINK_LIMIT
 from ftcc.link.channel import Edge
-from ftcc.link.compiled import compiled, copy, fields
+from ftcc.link.compiled import compiled, compiled_apart, copy, fields
 from ftcc.link.events import note
 from ftcc.link.flight_modes import MISSION
 
@@ -71,7 +71,7 @@ def makes_room(autopilots, i):
     return autopilots.cooperation.apart[i, _LIMIT] < math.inf
 
 
-@compiled
+@compiled_apart
 def cooperate(autopilots, inbox, i, now_us, dt):
     """Bring what UAV ``i`` knows of its neighbours, its edges' weights and whether it belongs to this tick.
 
@@ -189,7 +189,7 @@ def _decide(autopilots, inbox, i, gains, now_us, dt):
         note(autopilots.events, now_us, i, LEFT, 0)
 
 
-@compiled
+@compiled_apart
 def refer_apart(autopilots, inbox, i, now_us, period_us):
     """Bring the reference of UAV ``i``, which is apart, to this tick; from the next one on it belongs if it is back."""
     if fly_apart(autopilots, inbox, i, now_us, period_us):
