@@ -210,7 +210,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         mode=np.full(k, MISSION),
         held_us=np.zeros(k, np.int64),
         diagnosis=diagnosis,
-        cooperation=new_cooperation(specs, scheme.plant, weight, profiles.parameters, shared_width),
+        cooperation=new_cooperation(specs, scheme, weight, profiles.parameters, shared_width),
         events=new_events(),
     )
     return autopilots, inbox

@@ -45,8 +45,8 @@ _NEAR, _ALIKE = 1.0, 0.3
 
 @compiled
 def _column(autopilots, source):
-    """Where records of the vertical plane have the entry ``source`` of a `longitudinal.Reference`; -1: nowhere."""
-    for m in range(autopilots.leader_shares.shape[0]):
+    """Where all records of the vertical plane have the entry ``source`` of a `longitudinal.Reference`; -1: nowhere."""
+    for m in range(autopilots.cooperation.columns[0]):
         if autopilots.leader_shares[m] == source:
             return m
     return -1

@@ -58,7 +58,7 @@ class Trial(NamedTuple):
     direct_mean: float
     """and the recent mean of its residual, unit."""
     air_square: float
-    """Of the flight path's residual in units of the actuator: recent mean square, unit^2, and product with ``direct``."""
+    """Of the flight path's residual in the actuator's unit: recent mean square, unit^2, product with ``direct``."""
     air_product: float
     regressor_mean: float
     """Recent mean of the uncertain part of the drift, unit."""

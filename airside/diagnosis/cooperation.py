@@ -16,7 +16,7 @@ from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.elements.vectors import turned
 from ftcc.airside.flight_path import Own
 from ftcc.airside.references import attitude, longitudinal, position
-from ftcc.airside.references.profiles import CLIMB_LIMIT, SINK_LIMIT
+from ftcc.airside.references.profiles import CLAMPED, CLIMB_LIMIT, SINK_LIMIT
 from ftcc.link.channel import Edge
 from ftcc.link.compiled import compiled, compiled_apart, copy, fields
 from ftcc.link.events import note
@@ -143,7 +143,8 @@ def _make_room(autopilots, inbox, i, gains, now_us, dt):
         limit = max(least, min(limit, max(present, least)) - step)
     elif least > limit:
         limit = min(limit + step, least)
-        if least == math.inf and limit >= min(own, MOST_CLIMB):
+        # A profile that is slower by itself needs no limit.
+        if least == math.inf and (limit >= own or autopilots.profile_state[i, CLAMPED] == 0.0):
             limit = math.inf
             note(autopilots.events, now_us, i, NO_ROOM, 0)
     c.apart[i, _LIMIT] = limit

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ftcc.airside.diagnosis.beliefs import Health, new_health
 from ftcc.airside.references import longitudinal
 from ftcc.airside.references.profiles import CLIMB_LIMIT, SINK_LIMIT
+from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import width
 
@@ -62,6 +63,8 @@ class Cooperation(NamedTuple):
 
     kind: NDArray[np.int64]
     """(1,): `LONGITUDINAL`, `ATTITUDE` or `POSITION`."""
+    columns: NDArray[np.int64]
+    """(1,): how many entries the records of followers have for the scheme; leaders' may have more."""
     neighbours: NDArray[np.float64]
     """(k, n, 5): see `Neighbour`."""
     share: NDArray[np.float64]
@@ -85,19 +88,23 @@ class Cooperation(NamedTuple):
 
 
 def new_cooperation(
-    specs: Sequence[AutopilotSpec], plant: str, weight: NDArray[np.float64], profile: NDArray[np.float64], shared: int
+    specs: Sequence[AutopilotSpec],
+    scheme: Scheme,
+    weight: NDArray[np.float64],
+    profile: NDArray[np.float64],
+    shared: int,
 ) -> Cooperation:
     """Before the first tick, when everybody belongs.
 
     Parameters
     ----------
-    specs, plant : of the autopilots, and the plant of their scheme.
+    specs, scheme : of the autopilots.
     weight : (k, n), a_ij of the in-edges.
     profile : (k, p), see `profile_arrays`.
     shared : numbers in a record.
     """
     k, n = weight.shape
-    kind = _PLANTS.index(plant)
+    kind = _PLANTS.index(scheme.plant)
     neighbours = np.zeros((k, n, len(Neighbour._fields)))
     neighbours[:, :, 1:] = new_health(1)[0]
     apart = np.zeros((k, width(Apart)))
@@ -111,6 +118,7 @@ def new_cooperation(
     speed = longitudinal.Reference._fields.index("V")
     return Cooperation(
         kind=np.array([kind], np.int64),
+        columns=np.array([len(scheme.shared["follower"])], np.int64),
         neighbours=neighbours,
         share=np.ones((k, n)),
         weight=weight.copy(),
