@@ -23,18 +23,11 @@ _LOSS = 0.3
 """Share of records that the radio loses."""
 _COEFFICIENT = (0.8, 1.2)
 """Factor of each true aerodynamic coefficient."""
-_LIGHT, _MODERATE = 7.7, 15.4
-"""Wind at 20 ft of light and of moderate turbulence, m/s: 15 and 30 kt (MIL-F-8785C, 3.7.3.4)."""
-_ALTITUDE = 304.8
-"""Altitude of the turbulence, m: the highest of that model, where its scale lengths are longest."""
-_GUST = 3.0
-"""Largest component of a discrete gust, m/s."""
-_VERTICAL = ((0.5, _GUST), (-_GUST, -0.5))
-"""That of the two gusts of a flight upwards, m/s: one lifts and one presses down."""
-_GUST_LENGTH = (20.0, 100.0)
-"""m."""
+_AIR = {"sigma": [0.5, 0.5, 0.35], "length": [200.0, 200.0, 50.0]}
+"""Turbulence (m/s, m) of a scenario that has none of its own: light air of low flight. In rougher air the thresholds
+must be wider; a scenario that flies in it declares it."""
 _SHIFT = 1.0
-"""Largest delay of a manoeuvre or disturbance, s, so that it meets every phase of sampling and exchange."""
+"""Largest delay of a manoeuvre, s, so that it meets every phase of sampling and exchange."""
 
 
 def _uniform(low: float, high: float) -> dict[str, Any]:
@@ -50,16 +43,15 @@ def healthy_changes(scenario: Scenario, mission: Mission) -> dict[str, Any]:
         The scenario with `HEALTHY`, and its mission.
     """
     plan = scenario.plan
+    # A step of a disturbance is what a bias of the actuator of its equation is: nobody can tell them apart.
     changes = HEALTHY | {
         "channel": {"loss": _LOSS},
+        "disturbances": [],
         "noise": _noise(plan, mission),
         "record_rate": plan.rates.control_rate,
     }
-    if _flies_in_air(mission):
-        if plan.turbulence is None:
-            changes["turbulence"] = {"wind_20ft": _LIGHT, "altitude": _ALTITUDE}
-        gusts = [{"at": 0.0, "up": low, "length": _GUST_LENGTH[0], "held": False} for low, _ in _VERTICAL]
-        changes["gusts"] = [*scenario.document.get("gusts", []), *gusts]
+    if _flies_in_air(mission) and plan.turbulence is None and not plan.gusts:
+        changes["turbulence"] = _AIR
     return changes
 
 
@@ -67,14 +59,6 @@ def healthy_quantities(scenario: Scenario, mission: Mission) -> dict[str, dict[s
     """Return what is drawn for each healthy flight, as in ``[study.random]``; see `healthy_changes`."""
     plan = scenario.plan
     found = {f"plant.coefficients.{name}": _uniform(*_COEFFICIENT) for name in _coefficients(mission)}
-    if _flies_in_air(mission):
-        if plan.turbulence is None:
-            found["turbulence.wind_20ft"] = _uniform(_LIGHT, _MODERATE)
-        for n, vertical in enumerate(_VERTICAL, len(plan.gusts)):
-            found[f"gusts.{n}.at"] = _uniform(0.0, 0.9 * plan.duration)
-            found[f"gusts.{n}.length"] = _uniform(*_GUST_LENGTH)
-            found[f"gusts.{n}.up"] = _uniform(*vertical)
-            found |= {f"gusts.{n}.{name}": _uniform(-_GUST, _GUST) for name in ("along", "right")}
     return found | {key: _uniform(at, latest) for key, at, latest in _shifted(plan)}
 
 
@@ -102,9 +86,8 @@ def _noise(plan: Plan, mission: Mission) -> dict[str, float]:
 
 
 def _shifted(plan: Plan) -> Iterator[tuple[str, float, float]]:
-    """Key, time (s) and latest time of each manoeuvre and disturbance that begins at a time."""
+    """Key, time (s) and latest time of each manoeuvre that begins at a time."""
     lists: list[tuple[str, Sequence[Any]]] = [
-        ("disturbances", plan.disturbances),
         ("fire_events", plan.fire_events),
         ("attitude.commands", plan.attitude.commands if plan.attitude else ()),
         *((f"leaders.{uav}.commands", leader.commands) for uav, leader in plan.leaders.items()),
