@@ -13,6 +13,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR
 from ftcc.link.compiled import compiled, compiled_apart, copy, fields, store
+from ftcc.link.rotation import wrapped
 
 __all__ = ["diagnose"]
 
@@ -31,8 +32,10 @@ _SLIP_BANDWIDTH = 4.0
 """Of the observers of the kinematics, rad/s."""
 _OUTLIER = 8.5
 """A step beyond this many standard deviations of noise, and what full travel gives, is none of an aircraft."""
-_FASTEST_TURN = 1.0
+_FASTEST_BEND = 1.0
 """Unexplained turn of the flight path that no air makes, rad/s."""
+_FASTEST_TURN = 2.0
+"""Turn of the flight path that no aircraft makes, rad/s."""
 _SETTLING = 2.0
 """Time after the first tick without alarms, s."""
 
@@ -102,7 +105,10 @@ def _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now):
     """
     held = own.q == past.q and own.theta == past.theta and own.p == past.p and own.r == past.r
     held = held or (own.V == past.V and own.gamma == past.gamma and own.chi == past.chi)
-    jumped = abs(turn) > _OUTLIER * gains.sd_angle + _FASTEST_TURN * dt
+    jumped = abs(turn) > _OUTLIER * gains.sd_angle + _FASTEST_BEND * dt
+    furthest = _OUTLIER * gains.sd_angle + _FASTEST_TURN * dt
+    jumped = jumped or abs(own.gamma - past.gamma) > furthest
+    jumped = jumped or abs(wrapped(own.chi - past.chi)) * math.cos(own.gamma) > furthest
     bank, alpha, beta = 0.0, 0.0, 0.0
     if d.point[i] == 0:
         kept = 1.0 - min(_SLIP_BANDWIDTH * dt, 1.0)

@@ -24,6 +24,8 @@ _FAR_APART = 1.2
 """Size of one that is learned at once, in drifts."""
 _BENDS = 3.0
 """Time constant with which others are learned, s."""
+_AT_MOST = 6.0
+"""Drifts that a residual counts at most, so that a jump of a sensor alone raises no alarm."""
 _UNSURE = 1.0
 """How many standard deviations a coefficient may be off without an alarm."""
 RECENTLY = 1.5
@@ -120,8 +122,9 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
     # Test. What a wrong coefficient may do is not tested.
     tolerated = drift + _UNSURE * gains.sd_coefficient * abs(motion.regressor - regressor_mean)
     tested = agreeing(calm_residual, residual, _GUSTY * gusts)
-    up = sum_up(trial.up, tested, tolerated, travel, dt)
-    down = sum_up(trial.down, -tested, tolerated, travel, dt)
+    most = min(travel, _AT_MOST * tolerated)
+    up = sum_up(trial.up, tested, tolerated, most, dt)
+    down = sum_up(trial.down, -tested, tolerated, most, dt)
     if excused:
         up, down = 0.0, 0.0
     evidence = max(up, down) / limit
