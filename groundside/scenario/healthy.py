@@ -95,7 +95,8 @@ def _shifted(plan: Plan) -> Iterator[tuple[str, float, float]]:
     for where, events in lists:
         times = sorted(event.at for event in events if event.at is not None)
         for n, event in enumerate(events):
-            if event.at is not None:
+            # A reference of attitude begins with a command at t = 0.
+            if event.at is not None and (where != "attitude.commands" or event.at > 0.0):
                 later = [time - event.at for time in times if time > event.at]
                 ends = [event.until - event.at] if getattr(event, "until", None) is not None else []
                 yield f"{where}.{n}.at", event.at, event.at + min([_SHIFT, *(0.5 * gap for gap in (*later, *ends))])
