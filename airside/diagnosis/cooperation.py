@@ -45,6 +45,8 @@ _WEAK_FOR, _SOUND_FOR, _BEGUN, _JOINS, _LIMIT = (
 )
 _ENOUGH = 1.2
 """Climb rate of the weakest follower, over the leader's own limit, from which on it is not held back any more."""
+_UNDER_WAY = 0.5
+"""Rate at which a UAV that gets nearer to its place is on its way there, m/s."""
 _AS_NEW = 0.9
 """Effectiveness from which on a UAV may come back."""
 _Z, _Z_DOT = (longitudinal.Reference._fields.index(name) for name in ("z", "z_dot"))
@@ -154,12 +156,16 @@ def _make_room(autopilots, inbox, i, gains, now_us, dt):
 
 @compiled
 def _off_its_place(autopilots, inbox, i, gains):
-    """How far UAV ``i`` is off its place, over what it may be; 0 where its place is not known."""
+    """How far UAV ``i`` is off its place, over what it may be; 0 where its place is not known.
+
+    In the vertical plane also while it is on its way there: who leaves or comes back moves the places of others.
+    """
     own, reference = fields(Own, autopilots.own[i]), autopilots.reference[i]
     kind = autopilots.cooperation.kind[0]
     if kind == LONGITUDINAL:
-        z, _ = place(autopilots, inbox, i, _Z, _Z_DOT)
-        return abs(own.z - z) / gains.astray if z == z else 0.0
+        z, z_dot = place(autopilots, inbox, i, _Z, _Z_DOT)
+        nearer = (own.V * math.sin(own.gamma) - z_dot) * (1.0 if z > own.z else -1.0)
+        return abs(own.z - z) / gains.astray if z == z and nearer < _UNDER_WAY else 0.0
     if kind == ATTITUDE:
         wanted = fields(attitude.Reference, reference)
         error = turned((own.mu, own.alpha, own.beta), (wanted.mu, wanted.alpha, wanted.beta))

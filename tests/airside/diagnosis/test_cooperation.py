@@ -236,6 +236,18 @@ def test_one_that_is_healthy_but_far_from_its_place_stays():
         assert flown.belongs is stays
 
 
+def test_one_that_is_on_its_way_to_its_place_stays():
+    """Who comes back moves the places of others by a hundred metres at once."""
+    flown = Lone(spec(1))
+    flown.set_health(state=FAULTY)
+    for n in range(2000):
+        flown.fly_at(900.0 + 2.0 * n * DT, gamma=math.asin(2.0 / 30.0))
+        for sender in GRAPH.senders(1):
+            flown.hear(sender)
+        flown.tick()
+    assert flown.belongs
+
+
 def test_after_a_repair_it_flies_to_its_place_and_belongs_again():
     flown = Lone(spec(1))
     leave(flown, 990.0)
