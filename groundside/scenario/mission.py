@@ -322,7 +322,7 @@ def _autopilots(
     graph, scheme = basis.graph, basis.scheme
     initial = initial_shared_values(scheme, vehicles, profiles)
     steered = _is_steered(basis)
-    told = health_edges(plan, graph)
+    added = health_edges(plan, graph)
     return tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -338,7 +338,7 @@ def _autopilots(
             reference=references[vehicle.uav],
             neighbours=(
                 *(Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)),
-                *(Neighbour(j, 0.0) for receiver, j in told if receiver == vehicle.uav),
+                *(Neighbour(j, 0.0) for receiver, j in added if receiver == vehicle.uav),
             ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
@@ -347,7 +347,7 @@ def _autopilots(
             datum=vehicle.datum,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
             attitude_code=vehicle.attitude_code,
-            receivers=(*graph.receivers(vehicle.uav), *(i for i, sender in told if sender == vehicle.uav)),
+            receivers=(*graph.receivers(vehicle.uav), *(i for i, sender in added if sender == vehicle.uav)),
         )
         for vehicle in vehicles
     )

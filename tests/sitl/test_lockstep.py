@@ -127,3 +127,27 @@ def test_a_swarm_in_which_one_hears_nobody_and_one_is_heard_by_nobody_flies(
     """A leader waits for the acknowledgement of a follower that has nobody to tell anything."""
     flight = fly(str(swarm_file(tmp_path, 2, duration=20.0)), "--speed", "max")
     assert flight.wait() == 0, flight.output
+
+
+def test_a_swarm_that_makes_room_equals_the_simulation(fly: Callable[..., Flight], tmp_path: Path) -> None:
+    """UAV 1 leaves: health travels over edges that only leaders use, through a lossy channel, between processes."""
+    from ftcc.groundside.scenario.loading import load
+    from ftcc.groundside.scenario.mission import resolve
+    from ftcc.groundside.simulation import simulate
+
+    settings = [
+        "diagnosis.on=true",
+        "diagnosis.cooperate=true",
+        "disturbances=[]",
+        "faults=[{at=16.0,uav=1,actuator='elevator',effectiveness=0.4,bias=0.15,without_trim=true}]",
+    ]
+    simulated = simulate(
+        resolve(load("containment", variants=("loss30",), settings=settings, duration=30.0)), tmp_path / "simulated"
+    )
+    said = [text for _, uav, _, text in simulated.events if uav in (1, 7)]
+    assert "leaves the swarm: it cannot keep up" in said
+    assert "leader makes room: it climbs and sinks no faster than UAV 1 can" in said
+    given = [part for setting in settings for part in ("--set", setting)]
+    flight = fly("containment", "--variant", "loss30", "--duration", "30", "--speed", "max", *given)
+    assert flight.wait(240) == 0, flight.output
+    assert same_flight(flight.folder, tmp_path / "simulated")

@@ -208,11 +208,11 @@ def test_one_that_cannot_climb_leaves_says_so_and_flies_level_where_it_is():
     leave(flown, 990.0)
     assert flown.events() == ["leaves the swarm: it cannot keep up"]
     assert hears_virtual_leader(flown.autopilots, 0)
-    told, motion = flown.autopilots.cooperation.records, []
+    records, motion = flown.autopilots.cooperation.records, []
     for _ in range(3000):
         flown.tick(refer_apart)
         assert not flown.belongs
-        motion.append(told[0, 0, :2].copy())
+        motion.append(records[0, 0, :2].copy())
     z, z_dot = np.array(motion).T
     assert z[0] == pytest.approx(1000.0, abs=1e-9), "it begins where the law's own estimate is"
     assert z[-1] == pytest.approx(990.0, abs=0.01)
