@@ -22,6 +22,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ftcc.airside.model import level_deflections
+from ftcc.airside.point_mass import drag
 from ftcc.groundside.scenario import (
     HEALTHY,
     Mission,
@@ -40,7 +42,7 @@ from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.flying import Outcome
 from ftcc.groundside.studies.plan import StudyPlan
 from ftcc.groundside.studies.planning import plan_of_fields
-from ftcc.link.actuators import SLOT, unit_of
+from ftcc.link.actuators import unit_of
 
 __all__ = ["MARGIN", "Calibrated", "Calibration", "Threshold", "calibrate", "plan_calibration"]
 
@@ -50,10 +52,10 @@ _SHARES = (0.2, 0.3, 0.4, 0.5, 0.65, 0.8)
 """Drifts that are tried, over the smallest fault that is to be found fast."""
 _TRIED = 0.1
 """Share of the hours that each of them flies."""
-_SMALLEST = {"thrust": 0.2, "load_factor": 0.1}
-"""That fault, over the actuator's full deflection; of an angle it is `_SMALLEST_ANGLE`."""
-_SMALLEST_ANGLE = 0.1
-"""rad."""
+_SMALLEST_ANGLE, _SMALLEST_LOAD = 0.07, 0.3
+"""That fault, rad and load factor: about what a third less elevator does in level flight."""
+_SMALLEST_THRUST = 0.8
+"""That of thrust, over the thrust of level flight: its total loss."""
 _SOONEST = 0.02
 """Time before which the smallest fault is not to raise an alarm, s: the least limit."""
 _NEVER = 100.0
@@ -216,12 +218,23 @@ def _smallest_faults(scenario: Scenario, mission: Mission) -> dict[str, float]:
     """By actuator that diagnosis watches, the smallest fault that is to be found fast."""
     spec = mission.autopilots[0]
     found = {}
+    level = _level_thrust(scenario, mission)
+    faults = {"thrust": _SMALLEST_THRUST * level, "load_factor": _SMALLEST_LOAD}
     for actuator in spec.diagnosis.actuators:
-        share = _SMALLEST.get(actuator)
-        found[actuator] = _SMALLEST_ANGLE if share is None else share * spec.travel[SLOT[actuator]]
+        found[actuator] = faults.get(actuator, _SMALLEST_ANGLE)
     if not found:
         raise StudyError(f"{scenario.name}: no actuator of it is watched by diagnosis")
     return found
+
+
+def _level_thrust(scenario: Scenario, mission: Mission) -> float:
+    """Thrust (N) of level flight at the speed of the start, by the nominal model."""
+    model, V = mission.autopilots[0].model, scenario.plan.start.V
+    if V is None:
+        V = next(own.V for own in scenario.plan.start.uav.values() if own.V is not None)
+    if mission.scheme.plant == "position":
+        return float(drag(V, 1.0, model))
+    return level_deflections(V, model)["thrust"]
 
 
 def _with_gains(document: dict[str, Any], gains: Mapping[str, float]) -> dict[str, Any]:
