@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_told
+from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_accommodated
 from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, is_apart, refer_apart
 from ftcc.airside.diagnosis.health import share_health
 from ftcc.airside.diagnosis.stage import diagnose as _diagnose
@@ -174,7 +174,7 @@ def control(autopilots, inbox, i, dt):
     """
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
-    if is_told(autopilots, i):
+    if is_accommodated(autopilots, i):
         own, model = fields(Own, autopilots.diagnosis.own[i]), fields(Model, autopilots.diagnosis.model[i])
     else:
         own, model = fields(Own, autopilots.own[i]), fields(Model, autopilots.model[i])

@@ -15,7 +15,7 @@ from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR, RUDDER, THRUST
 from ftcc.link.compiled import compiled, compiled_apart, copy, fields
 
-__all__ = ["accommodate", "command_for", "is_told"]
+__all__ = ["accommodate", "command_for", "is_accommodated"]
 
 _COMMAND = Own._fields.index("aileron")
 _LIMITS = tuple(
@@ -41,7 +41,7 @@ def _towards(value, target, most):
 def accommodate(autopilots, i, dt):
     """Bring what the law of UAV ``i`` is told of its actuators to this tick: after `diagnose`, before the law."""
     d = autopilots.diagnosis
-    if not is_told(autopilots, i):
+    if not is_accommodated(autopilots, i):
         return
     gains = fields(DiagnosisGains, d.gains[i])
     copy(autopilots.model[i], d.model[i])
@@ -49,7 +49,7 @@ def accommodate(autopilots, i, dt):
     for slot in range(len(ACTUATORS)):
         if d.has[i, slot] == 0:
             continue
-        belief, told, travel = fields(Belief, d.belief[i, slot]), d.told[i, slot], d.travel[i, slot]
+        belief, assumed, travel = fields(Belief, d.belief[i, slot]), d.assumed[i, slot], d.travel[i, slot]
         known = belief.state == FAULTY and belief.effectiveness_sd < gains.determined
         if known and (belief.kind == LOSS or belief.kind == BIAS or belief.kind == WRONG):
             effectiveness = min(max(belief.effectiveness, gains.least), _MOST) if belief.kind != BIAS else 1.0
@@ -57,18 +57,18 @@ def accommodate(autopilots, i, dt):
         elif belief.state == HEALTHY:
             effectiveness, bias = 1.0, 0.0
         else:
-            effectiveness, bias = told[_EFFECTIVENESS], told[_BIAS]
-        told[_EFFECTIVENESS] = _towards(told[_EFFECTIVENESS], effectiveness, gains.pace * dt)
-        told[_BIAS] = _towards(told[_BIAS], bias, gains.pace * travel * dt)
+            effectiveness, bias = assumed[_EFFECTIVENESS], assumed[_BIAS]
+        assumed[_EFFECTIVENESS] = _towards(assumed[_EFFECTIVENESS], effectiveness, gains.pace * dt)
+        assumed[_BIAS] = _towards(assumed[_BIAS], bias, gains.pace * travel * dt)
         for end in range(2):
             d.model[i, _LIMITS[slot][end]] = (
-                told[_EFFECTIVENESS] * autopilots.model[i, _LIMITS[slot][end]] + told[_BIAS]
+                assumed[_EFFECTIVENESS] * autopilots.model[i, _LIMITS[slot][end]] + assumed[_BIAS]
             )
-        d.own[i, _COMMAND + slot] = told[_EFFECTIVENESS] * autopilots.own[i, _COMMAND + slot] + told[_BIAS]
+        d.own[i, _COMMAND + slot] = assumed[_EFFECTIVENESS] * autopilots.own[i, _COMMAND + slot] + assumed[_BIAS]
 
 
 @compiled
-def is_told(autopilots, i):
+def is_accommodated(autopilots, i):
     """Whether the law of UAV ``i`` flies by ``Diagnosis.own`` and ``Diagnosis.model``."""
     return autopilots.diagnosis.on[i] == 1 and autopilots.diagnosis.accommodates[i] == 1
 
@@ -77,9 +77,9 @@ def is_told(autopilots, i):
 def command_for(autopilots, i, slot, wanted):
     """The command by which an actuator of UAV ``i``, by what is believed of it, does what is ``wanted``, rad or N."""
     d = autopilots.diagnosis
-    if not is_told(autopilots, i):
+    if not is_accommodated(autopilots, i):
         return wanted
-    told = d.told[i, slot]
-    if told[_EFFECTIVENESS] == 1.0 and told[_BIAS] == 0.0:
+    assumed = d.assumed[i, slot]
+    if assumed[_EFFECTIVENESS] == 1.0 and assumed[_BIAS] == 0.0:
         return wanted
-    return min(max((wanted - told[_BIAS]) / told[_EFFECTIVENESS], -d.travel[i, slot]), d.travel[i, slot])
+    return min(max((wanted - assumed[_BIAS]) / assumed[_EFFECTIVENESS], -d.travel[i, slot]), d.travel[i, slot])

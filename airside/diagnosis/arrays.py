@@ -19,7 +19,7 @@ from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, in_slots
 from ftcc.link.compiled import Room, width
 
-__all__ = ["RECENT", "Diagnosis", "Memory", "Trial", "new_diagnosis"]
+__all__ = ["RECENT", "Diagnosis", "Memory", "Seen", "Trial", "new_diagnosis"]
 
 RECENT = 128
 """Ticks that are remembered, to estimate from the onset of a fault on."""
@@ -93,6 +93,15 @@ class Trial(NamedTuple):
     P: Annotated[NDArray[np.float64], Room((STATES, STATES))]
 
 
+class Seen(NamedTuple):
+    """What a tick showed of an actuator, as `estimator.predict` takes it."""
+
+    step: float
+    drift: float
+    regressor: float
+    position: float
+
+
 class Diagnosis(NamedTuple):
     """Of k autopilots; a is 4, the slots of the actuators, or 0 where no UAV of the process has diagnosis."""
 
@@ -129,14 +138,14 @@ class Diagnosis(NamedTuple):
     trial: NDArray[np.float64]
     """(k, a, n): see `Trial`."""
     recent: NDArray[np.float64]
-    """(k, a, `RECENT`, 4): of the last ticks the measured step, F, R and the position, see `estimator.predict`."""
+    """(k, a, `RECENT`, 4): of the last ticks, see `Seen`."""
     recent_at: NDArray[np.int64]
     """(k,): number of ticks since the first."""
     belief: NDArray[np.float64]
     """(k, a, n): see `Belief`."""
     health: NDArray[np.float64]
     """(k, n): see `Health`."""
-    told: NDArray[np.float64]
+    assumed: NDArray[np.float64]
     """(k, 4, 2): effectiveness and bias that the law is told of."""
     model: NDArray[np.float64]
     """(k, n): the `Model` that the law is told of."""
@@ -164,8 +173,8 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
             trial[i, :, at + n * STATES + n] = spread_coefficient[i] ** 2
     memory = np.zeros((k, width(Memory)))
     memory[:, Memory._fields.index("begun_at")] = math.nan
-    told = np.zeros((k, len(ACTUATORS), 2))
-    told[:, :, 0] = 1.0
+    assumed = np.zeros((k, len(ACTUATORS), 2))
+    assumed[:, :, 0] = 1.0
     return Diagnosis(
         on=np.array([spec.diagnosis.on and spec.role == "follower" for spec in specs], np.int64),
         accommodates=np.array([spec.diagnosis.accommodates for spec in specs], np.int64),
@@ -183,11 +192,11 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
         before=np.zeros((k, len(Own._fields))),
         motion=np.zeros((k, len(ACTUATORS), len(Motion._fields))),
         trial=trial,
-        recent=np.zeros((k, a, RECENT, 4)),
+        recent=np.zeros((k, a, RECENT, len(Seen._fields))),
         recent_at=np.zeros(k, np.int64),
         belief=new_beliefs(k, a),
         health=new_health(k),
-        told=told,
+        assumed=assumed,
         model=np.array([spec.model for spec in specs], np.float64),
         own=np.zeros((k, len(Own._fields))),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.diagnosis.arrays import RECENT, Trial
+from ftcc.airside.diagnosis.arrays import RECENT, Seen, Trial
 from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, NO_KIND, SUSPECTED, UNDETERMINED, Belief
 from ftcc.airside.diagnosis.decision import agreeing, follow, gather, kind_of, sum_up
 from ftcc.airside.diagnosis.estimator import RHO, B, C, Y, correct, predict, widen
@@ -100,8 +100,8 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
         by_air = share * motion.air * moved[0]
         modelled = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
         calm_step = modelled + alone * (motion.step - by_air - modelled)
-    recent = d.recent[i, slot, d.recent_at[i] % RECENT]
-    recent[0], recent[1], recent[2], recent[3] = calm_step, motion.drift, motion.regressor, position
+    seen = Seen(calm_step, motion.drift, motion.regressor, position)
+    store(seen, d.recent[i, slot, d.recent_at[i] % RECENT])
     predict(x, P, dt, calm_step, motion.drift, motion.regressor, position, spread)
     noise = alone * math.sqrt(motion.noise * motion.noise + share * noisy * share * noisy)
     if worthless:
@@ -242,8 +242,8 @@ def _begin_anew(d, i, slot, gains, x, P, spread_bias, spread, noise, since, dt):
     widen(P, RHO, gains.sd_effectiveness)
     widen(P, B, spread_bias)
     for n in range(last - ticks + 1, last + 1):
-        row = d.recent[i, slot, n % RECENT]
-        predict(x, P, dt, row[0], row[1], row[2], row[3], spread)
+        seen = fields(Seen, d.recent[i, slot, n % RECENT])
+        predict(x, P, dt, seen.step, seen.drift, seen.regressor, seen.position, spread)
         correct(x, P, noise, True)
 
 
@@ -257,17 +257,19 @@ def _look_back(d, i, slot, trial, travel, gains, kept, since, dt):
     last = d.recent_at[i]
     ticks = min(int(since / dt) + 1, RECENT, last)
     first = last - ticks + 1
-    whole, filtered = 0.0, d.recent[i, slot, first % RECENT, 3]
+    whole, filtered = 0.0, fields(Seen, d.recent[i, slot, first % RECENT]).position
     fill(trial.sums, 0.0)
     fill(trial.square, 0.0)
     fill(trial.lagging, 0.0)
     fill(trial.slow, filtered)
     for n in range(first, last + 1):
-        row = d.recent[i, slot, n % RECENT]
-        whole = (1.0 - min(gains.bandwidth * dt, 1.0)) * whole + row[0] - dt * (row[1] + effectiveness * row[3] + bias)
-        filtered += min(gains.bandwidth * dt, 1.0) * (row[3] - filtered)
-        gather(trial.sums, gains.bandwidth * whole, filtered, dt)
-        follow(trial.slow, trial.lagging, trial.square, gains.bandwidth * whole, row[3], travel, gains.bandwidth, dt)
+        seen = fields(Seen, d.recent[i, slot, n % RECENT])
+        healthy = seen.drift + effectiveness * seen.position + bias
+        whole = (1.0 - min(gains.bandwidth * dt, 1.0)) * whole + seen.step - dt * healthy
+        filtered += min(gains.bandwidth * dt, 1.0) * (seen.position - filtered)
+        residual = gains.bandwidth * whole
+        gather(trial.sums, residual, filtered, dt)
+        follow(trial.slow, trial.lagging, trial.square, residual, seen.position, travel, gains.bandwidth, dt)
     return whole, filtered
 
 

@@ -75,7 +75,7 @@ class Slow:
     ],
     ids=["loss", "bias", "loss and bias", "stuck", "floating", "slow"],
 )
-def test_each_kind_is_told_from_the_others(actual, kind):
+def test_each_kind_is_accommodated_from_the_others(actual, kind):
     assert decided(actual) == kind
 
 

@@ -101,7 +101,7 @@ def test_a_repair_is_noticed():
     assert states[-1] == STATES.index("healthy")
 
 
-def test_a_law_that_is_told_compensates_what_it_is_told():
+def test_a_law_that_is_accommodated_compensates_what_it_is_accommodated():
     """The command that the aircraft gets is that which, by the belief, does what the law wants."""
     told = flown(*ON, "diagnosis.accommodate=true", fault("effectiveness=0.4"))
     passive = flown(*ON, fault("effectiveness=0.4"))
