@@ -32,6 +32,8 @@ class Level(NamedTuple):
     """m/s."""
     climb: float
     """m/s: 0, or the sink rate that is left where no speed can be held level."""
+    spare: float
+    """Climb rate that the thrust leaves there, m/s; may be negative."""
 
 
 @compiled
@@ -97,7 +99,8 @@ def level_speed(d, i, wanted, model):
             best, V = spare, tried
     thrust = _end(d, i, THRUST, model.thrust_max)
     needed = drag(V, 1.0, model) if d.point[i] == 1 else level_flight(V, model)[1]
-    return Level(V, min((thrust - needed) * V / (model.m * model.g), 0.0))
+    spare_climb = (thrust - needed) * V / (model.m * model.g)
+    return Level(V, min(spare_climb, 0.0), spare_climb)
 
 
 @compiled

@@ -34,7 +34,9 @@ _BEGUN, _GOES_V, _GOES_Z = (Apart._fields.index(name) for name in ("begun", "V",
 _FREQUENCY = 1.0
 """Of the shaper of the altitude, rad/s."""
 _CLIMB, _ACCELERATION = 3.0, 0.5
-"""Its largest climb rate, m/s, and acceleration, m/s^2; the latter also of the speed."""
+"""Its largest sink rate, m/s, and acceleration, m/s^2; the latter also of the speed."""
+_OF_SPARE, _LEAST_CLIMB = 0.6, 0.1
+"""Its largest climb rate: share of what the thrust leaves, and at least this, m/s."""
 _CATCHES_UP = 0.2
 """Rate at which a distance or a difference in speed is made good, 1/s,"""
 _OVERTAKES = 4.0
@@ -93,12 +95,16 @@ def _begin_lone(autopilots, i, own, row):
 
 
 @compiled
-def _move_lone(row, V, x, x_dot, z, z_dot, dt):
-    """Move the virtual leader towards airspeed ``V``, forward position ``x`` and altitude ``z`` with their rates."""
+def _move_lone(row, V, x, x_dot, z, z_dot, spare, dt):
+    """Move the virtual leader towards airspeed ``V``, forward position ``x`` and altitude ``z`` with their rates.
+
+    ``spare`` is the climb rate that the thrust leaves, m/s.
+    """
     lone = fields(_Reference, row)
     forward = x_dot + clip(_CATCHES_UP * (x - lone.x), -_OVERTAKES, _OVERTAKES) if x == x else V
     V_dot = clip(_CATCHES_UP * (V - lone.V), -_ACCELERATION, _ACCELERATION)
-    up, up_dot, jerk = reference_shaper(lone.z, lone.z_dot, lone.z_ddot, z, z_dot, _FREQUENCY, _CLIMB, _ACCELERATION)
+    fastest = _CLIMB if z < lone.z else clip(_OF_SPARE * spare, _LEAST_CLIMB, _CLIMB)
+    up, up_dot, jerk = reference_shaper(lone.z, lone.z_dot, lone.z_ddot, z, z_dot, _FREQUENCY, fastest, _ACCELERATION)
     moved = _Reference(
         x=lone.x + dt * lone.x_dot,
         V=lone.V + dt * V_dot,
@@ -129,11 +135,11 @@ def _fly_lone(autopilots, inbox, i, joins, hold, own, level, dt):
         x, x_dot = place(autopilots, inbox, i, _X, _X_DOT)
         V, _ = place(autopilots, inbox, i, _V, _V_DOT)
         V = V if V == V else c.speed[i]
-        _move_lone(row, V, x, x_dot, z, z_dot, dt)
+        _move_lone(row, V, x, x_dot, z, z_dot, level.spare, dt)
         arrived = _has_arrived(row, V, x, z, z_dot)
     else:
         x = own.x if _column(autopilots, _X) >= 0 else math.nan
-        _move_lone(row, level.V, x, level.V, hold, level.climb, dt)
+        _move_lone(row, level.V, x, level.V, hold, level.climb, level.spare, dt)
     autopilots.reference[i, _V] = c.speed[i] if arrived else row[_V]
     autopilots.reference[i, _V_DOT] = 0.0 if arrived else row[_V_DOT]
     for m in range(c.records.shape[2]):

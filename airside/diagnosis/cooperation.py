@@ -47,6 +47,8 @@ _ENOUGH = 1.2
 """Climb rate of the weakest follower, over the leader's own limit, from which on it is not held back any more."""
 _UNDER_WAY = 0.5
 """Rate at which a UAV that gets nearer to its place is on its way there, m/s."""
+_GENTLY = 10.0
+"""Who comes back moves the places of others, perhaps upwards: edges fade in this many times slower than out."""
 _AS_NEW = 0.9
 """Effectiveness from which on a UAV may come back."""
 _Z, _Z_DOT = (longitudinal.Reference._fields.index(name) for name in ("z", "z_dot"))
@@ -116,7 +118,7 @@ def _weigh(autopilots, inbox, i, gains, dt):
     for edge in range(inbox.degree[i]):
         target = belongs * c.neighbours[i, edge, _NEIGHBOUR_BELONGS]
         share = c.share[i, edge]
-        share += min(max(target - share, -step), step)
+        share += min(max(target - share, -step), step / _GENTLY)
         c.share[i, edge] = share
         autopilots.weight[i, edge] = share * c.weight[i, edge]
 
