@@ -39,7 +39,8 @@ def test_another_kind_or_actuator_is_wrong(fault: dict[str, Any], alarms: dict[s
 
 def test_only_determined_estimates_count() -> None:
     vague, gone = replace(FAULT, effectiveness_sd=0.3), replace(FAULT, kind_compared="none")
-    assert known_faults([FAULT, vague, gone], 0.1) == [FAULT]
+    stuck, slow = replace(FAULT, true_kind="stuck"), replace(FAULT, true_kind="slow")
+    assert known_faults([FAULT, vague, gone, stuck, slow], 0.1) == [FAULT]
 
 
 def test_a_study_with_diagnosis_has_its_numbers_beside_the_headline(tmp_path: Path) -> None:
