@@ -99,7 +99,7 @@ class Autopilots(NamedTuple):
     diagnosis: Diagnosis
     cooperation: Cooperation
     events: EventList
-    """What leaders, and UAVs that leave, have to report, see `leader.drain_leader_events`."""
+    """What leaders, and UAVs that leave or change a belief, have to report, see `leader.drain_leader_events`."""
 
 
 class _Profiles(NamedTuple):

@@ -13,6 +13,7 @@ from typing import Any
 
 from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_accommodated
 from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, is_apart, refer_apart
+from ftcc.airside.diagnosis.events import note_beliefs
 from ftcc.airside.diagnosis.health import share_health
 from ftcc.airside.diagnosis.stage import diagnose as _diagnose
 from ftcc.airside.flight_path import Own, decode_state
@@ -116,6 +117,7 @@ def diagnose(autopilots, i, now_us, dt):
     """What UAV ``i`` finds out about its own actuators, and what its law is told of it; nothing where it is off."""
     if autopilots.diagnosis.on[i] == 1:
         _diagnose(autopilots, i, now_us, dt)
+        note_beliefs(autopilots, i, now_us)
         accommodate(autopilots, i, dt)
 
 

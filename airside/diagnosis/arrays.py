@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ftcc.airside.diagnosis.beliefs import new_beliefs, new_health
 from ftcc.airside.diagnosis.decision import SLEWS, SUMS
 from ftcc.airside.diagnosis.estimator import STATES
+from ftcc.airside.diagnosis.events import new_announced, new_details
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.diagnosis.motion import Motion
 from ftcc.airside.flight_path import Own
@@ -145,6 +146,10 @@ class Diagnosis(NamedTuple):
     """(k, a, n): see `Belief`."""
     health: NDArray[np.float64]
     """(k, n): see `Health`."""
+    announced: NDArray[np.float64]
+    """(k, a, n): see `events.Announced`."""
+    details: NDArray[np.float64]
+    """(rows, n): numbers of the events in ``Autopilots.events``, see `events.new_details`."""
     assumed: NDArray[np.float64]
     """(k, 4, 2): effectiveness and bias that the law is told of."""
     model: NDArray[np.float64]
@@ -196,6 +201,8 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
         recent_at=np.zeros(k, np.int64),
         belief=new_beliefs(k, a),
         health=new_health(k),
+        announced=new_announced(k, a),
+        details=new_details(a),
         assumed=assumed,
         model=np.array([spec.model for spec in specs], np.float64),
         own=np.zeros((k, len(Own._fields))),
