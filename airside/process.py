@@ -101,6 +101,7 @@ class AutopilotProcess:
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
         self.gcs_links = [GcsLink(self.view(i)) for i in range(len(specs))]
+        self.link_of = {spec.uav: link for spec, link in zip(specs, self.gcs_links, strict=True)}
         for link in self.gcs_links:
             for socket in link.sockets:
                 self.waiter.add(socket, partial(link.listen, socket))
@@ -174,6 +175,7 @@ class AutopilotProcess:
         if to_do & EVENTS:
             for at_us, uav, severity, text in drain_leader_events(self.group.autopilots, self.specs):
                 self.gate.report(EventReport(severity, text, uav, at_us))
+                self.link_of[uav].show_event(severity, text)
         if to_do & (TELEMETRY | SECOND):
             # What the log has of each simulated second is sent when this process is awake anyhow.
             self.send_telemetry()
