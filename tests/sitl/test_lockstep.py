@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from tests.bench.swarms import swarm_file
 from tests.sitl.conftest import Flight, events, same_flight
 
 DURATION = "30"
+BELIEF = re.compile("something is wrong|faulty|fault has changed|healthy again")
 
 
 @pytest.fixture(scope="module")
@@ -149,3 +151,8 @@ def test_a_swarm_that_makes_room_equals_the_simulation(fly: Callable[..., Flight
     flight = fly("containment", "--variant", "loss30", "--duration", "30", "--speed", "max", *given)
     assert flight.wait(240) == 0, flight.output
     assert same_flight(flight.folder, tmp_path / "simulated")
+    noticed = [(t, uav, severity, text) for t, uav, severity, text in simulated.events if BELIEF.search(text)]
+    assert [uav for _, uav, _, text in noticed if "something is wrong" in text] == [1]
+    assert "elevator faulty" in noticed[1][3]
+    logged = [(e["t"], e["uav"], e["severity"], e["text"]) for e in events(flight.folder)]
+    assert [event for event in logged if BELIEF.search(str(event[3]))] == noticed
