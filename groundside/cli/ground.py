@@ -73,7 +73,7 @@ def _say(text: str) -> None:
 
 
 def _faults_and_beliefs(name: str) -> dict[int, tuple[str, str]]:
-    """Of each UAV the faults that it has, and those that it believes to have; empty if no UAV diagnoses any."""
+    """Of each UAV that diagnoses its actuators the faults that it has, and those that it believes to have."""
     from ftcc.groundside.dashboard import describe_beliefs, describe_faults, watch_swarm
 
     try:
@@ -82,8 +82,11 @@ def _faults_and_beliefs(name: str) -> dict[int, tuple[str, str]]:
         # The swarm's station is busy or has ended: the UAVs answer for themselves.
         return {}
     uavs = snapshot.uavs if snapshot else {}
-    words = {uav: (describe_faults(state), describe_beliefs(state, state.effectiveness)) for uav, state in uavs.items()}
-    return words if any(believed for _, believed in words.values()) else {}
+    words = {}
+    for uav, state in uavs.items():
+        if believed := describe_beliefs(state, state.effectiveness):
+            words[uav] = (describe_faults(state) or "healthy", believed)
+    return words
 
 
 def vehicles(swarm: Swarm = None, key: Key = None) -> None:

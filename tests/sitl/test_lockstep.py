@@ -15,7 +15,13 @@ from tests.bench.swarms import swarm_file
 from tests.sitl.conftest import Flight, events, same_flight
 
 DURATION = "30"
-BELIEF = re.compile("something is wrong|faulty|fault has changed|healthy again")
+
+
+def changes_of_belief(folder: Path) -> list[tuple[object, object, object, str]]:
+    """Time, UAV, severity and text of the events in which a UAV tells what it believes of an actuator."""
+    words = re.compile("something is wrong|faulty|fault has changed|healthy again")
+    listed = [(event["t"], event["uav"], event["severity"], str(event["text"])) for event in events(folder)]
+    return [event for event in listed if words.search(event[3])]
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +157,7 @@ def test_a_swarm_that_makes_room_equals_the_simulation(fly: Callable[..., Flight
     flight = fly("containment", "--variant", "loss30", "--duration", "30", "--speed", "max", *given)
     assert flight.wait(240) == 0, flight.output
     assert same_flight(flight.folder, tmp_path / "simulated")
-    noticed = [(t, uav, severity, text) for t, uav, severity, text in simulated.events if BELIEF.search(text)]
-    assert [uav for _, uav, _, text in noticed if "something is wrong" in text] == [1]
-    assert "elevator faulty" in noticed[1][3]
-    logged = [(e["t"], e["uav"], e["severity"], e["text"]) for e in events(flight.folder)]
-    assert [event for event in logged if BELIEF.search(str(event[3]))] == noticed
+    ours, theirs = (changes_of_belief(folder) for folder in (flight.folder, tmp_path / "simulated"))
+    assert ours == theirs
+    assert [uav for _, uav, _, text in ours if "something is wrong" in text] == [1]
+    assert "elevator faulty" in ours[1][3]
