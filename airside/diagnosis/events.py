@@ -20,7 +20,7 @@ from ftcc.airside.diagnosis.beliefs import (
     Belief,
 )
 from ftcc.link.actuators import unit_of
-from ftcc.link.compiled import compiled, copy, width
+from ftcc.link.compiled import compiled, copy, fields, store, width
 from ftcc.link.events import CAPACITY, note
 
 __all__ = ["BELIEVES", "Announced", "belief_text", "new_announced", "new_details", "note_beliefs"]
@@ -59,15 +59,16 @@ def note_beliefs(autopilots, i, now_us):
     d = autopilots.diagnosis
     for slot in range(d.belief.shape[1]):
         state, kind = d.belief[i, slot, _STATE], d.belief[i, slot, _KIND]
-        announced = d.announced[i, slot]
-        if state == SUSPECTED or (state == announced[0] and kind == announced[1]):
+        announced = fields(Announced, d.announced[i, slot])
+        if state == SUSPECTED or (state == announced.state and kind == announced.kind):
             continue
         n = autopilots.events.used[0]
         note(autopilots.events, now_us, i, BELIEVES, slot)
         if autopilots.events.used[0] > n:
-            d.details[n, 0] = announced[0]
+            # In a full list it waits for the next tick.
+            d.details[n, 0] = announced.state
             copy(d.belief[i, slot], d.details[n, 1:])
-        announced[0], announced[1] = state, kind
+            store(Announced(state, kind), d.announced[i, slot])
 
 
 def belief_text(actuator: str, before: float, belief: Belief) -> tuple[str, str]:
