@@ -146,6 +146,8 @@ def test_a_swarm_that_makes_room_equals_the_simulation(fly: Callable[..., Flight
     settings = [
         "diagnosis.on=true",
         "diagnosis.cooperate=true",
+        "diagnosis.gains.drift_elevator=0.03",
+        "diagnosis.gains.limit_elevator=0.006",
         "disturbances=[]",
         "faults=[{at=16.0,uav=1,actuator='elevator',effectiveness=0.4,bias=0.15,without_trim=true}]",
     ]
