@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ftcc.airside.diagnosis.beliefs import (
     BIAS,
     FAULTY,
-    FLOATING,
     HEALTHY,
     KINDS,
     LOSS,
@@ -98,6 +97,6 @@ def belief_text(actuator: str, before: float, belief: Belief) -> tuple[str, str]
         return "warning", f"{name} faulty: bias {bias}"
     if kind == WRONG:
         return "warning", f"{name} faulty: {KINDS[kind]}, {effectiveness}, bias {bias}"
-    if kind in (LOSS, FLOATING):
+    if kind == LOSS:
         return "warning", f"{name} faulty: {KINDS[kind]}, {effectiveness}"
     return "warning", f"{name} faulty: {KINDS[kind]}"
