@@ -38,10 +38,10 @@ def test_link_events_act_on_these_edges_too():
     degraded = mission(*COOPERATES, "link_events=[{kind='degrade',uav=1,at=0.5,loss=0.5}]")
     changes = {spec.uav: spec.link_events for spec in degraded.autopilots}
     assert [change.sender for change in changes[8]] == [1]
-    cut = mission(*COOPERATES, "link_events=[{kind='cut',edge=[2,7],at=0.5}]")
-    assert [[change.sender for change in spec.link_events] for spec in cut.autopilots if spec.uav in (2, 7)] == [
+    cut = mission(*COOPERATES, "link_events=[{kind='cut',edge=[1,7],at=0.5}]")
+    assert [[change.sender for change in spec.link_events] for spec in cut.autopilots if spec.uav in (1, 7)] == [
         [7],
-        [2],
+        [1],
     ]
 
 
