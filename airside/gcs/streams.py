@@ -6,12 +6,14 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ftcc.airside.diagnosis.beliefs import UNDETERMINED, Belief
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.references.attitude import Reference as AttitudeReference
-from ftcc.link.actuators import THRUST
+from ftcc.link.actuators import ACTUATORS, THRUST
 from ftcc.link.channel import Channel, Edge
 from ftcc.link.compiled import fields
 from ftcc.link.flight_modes import custom_mode
@@ -254,9 +256,13 @@ def _signals(view: AutopilotView) -> Any:
 
 def _beliefs(view: AutopilotView) -> Any:
     diagnosis, i = view.autopilots.diagnosis, view.i
-    rows = diagnosis.belief[i, :, : len(BELIEF_FIELDS)].copy()
-    rows[diagnosis.has[i] == 0] = 0.0
-    rows[diagnosis.has[i] == 0, BELIEF_FIELDS.index("state")] = -1.0
+    # Without diagnosis there are no beliefs: no actuator is known.
+    rows = np.zeros((len(ACTUATORS), len(BELIEF_FIELDS)))
+    believed = diagnosis.belief[i]
+    rows[: len(believed)] = believed[:, : len(BELIEF_FIELDS)]
+    unknown = (diagnosis.has[i] == 0) | (len(believed) == 0)
+    rows[unknown] = 0.0
+    rows[unknown, BELIEF_FIELDS.index("state")] = -1.0
     return float_array(view.now_us, "beliefs", rows.ravel().tolist() + diagnosis.health[i].tolist())
 
 
