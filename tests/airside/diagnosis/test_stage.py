@@ -12,7 +12,8 @@ from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import fly_in_memory
 
-ON = ("diagnosis.on=true", "noise.factor=1", "disturbances=[]")
+ON = ("diagnosis={on=true,gains={drift_elevator=0.03,limit_elevator=0.006}}", "noise.factor=1", "disturbances=[]")
+"""Thresholds of the elevator for calm air."""
 AIR = "turbulence={sigma=[0.5,0.5,0.35],length=[200.0,200.0,50.0]}"
 AT = 12.0
 
