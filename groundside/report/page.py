@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ftcc.groundside.canvas import Drawn
 
 __all__ = [
-    "AT_TOP",
     "Cell",
     "Head",
     "Page",
@@ -30,10 +29,6 @@ __all__ = [
     "write",
     "write_html",
 ]
-
-
-AT_TOP = ("verdict", "claims", "faults", "alarms")
-"""Anchors of the sections before the figures."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class Page:
         """Return anchors and titles of the sections."""
         found = [(section.anchor, section.title) for section in self.sections]
         if self.figures:
-            before = sum(anchor in AT_TOP for anchor, _ in found)
+            before = sum(anchor in ("verdict", "claims") for anchor, _ in found)
             found.insert(before, ("figures", "Figures"))
         if self.scenario:
             found.append(("scenario", "Scenario as flown"))
@@ -92,7 +87,7 @@ class Page:
 
 def write(page: Page, path: Path) -> Path:
     """Write a page as one HTML file that includes its figures, and return its path."""
-    return write_html("page.html.jinja", path, **vars(page), contents=page.contents, at_top=AT_TOP)
+    return write_html("page.html.jinja", path, **vars(page), contents=page.contents)
 
 
 def write_html(template: str, path: Path, beside: Path | None = None, **content: Any) -> Path:
