@@ -109,8 +109,8 @@ def _in_use(block: PortBlock) -> int | None:
     """A port of a held block that is in use, beside those on which it is held."""
     from ftcc.link.mavlink import LOOPBACK  # listing running swarms needs no MAVLink
 
-    ports = range(block.base, block.base + block.size)
-    tcp = [port for port in ports if port not in block.guarded]
+    ports, held = range(block.base, block.base + block.size), block.guarded
+    tcp = [port for port in ports if port not in held]
     for kind, port in (*((socket.SOCK_STREAM, port) for port in tcp), *((socket.SOCK_DGRAM, port) for port in ports)):
         with socket.socket(socket.AF_INET, kind) as probe:
             if kind == socket.SOCK_STREAM:
