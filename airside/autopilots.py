@@ -9,6 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.diagnosis.arrays import Diagnosis, new_diagnosis
+from ftcc.airside.diagnosis.beliefs import HEALTH_SHARED, belief_signals
+from ftcc.airside.diagnosis.cooperation_arrays import Cooperation, new_cooperation
 from ftcc.airside.flight_path import Own
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import (
@@ -20,7 +23,7 @@ from ftcc.airside.references.profiles import (
     profile_arrays,
     trigger_rows,
 )
-from ftcc.airside.scheme import Scheme
+from ftcc.airside.scheme import Quantity, Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import SLOT
@@ -31,7 +34,7 @@ from ftcc.link.flight_modes import MISSION
 from ftcc.link.messages import PositionTarget
 from ftcc.link.timing import Timing
 
-__all__ = ["Autopilots", "build"]
+__all__ = ["Autopilots", "build", "recorded_signals"]
 
 
 class Autopilots(NamedTuple):
@@ -56,7 +59,7 @@ class Autopilots(NamedTuple):
     model: NDArray[np.float64]
     """(k, n): see `Model`."""
     weight: NDArray[np.float64]
-    """(k, n): a_ij of the in-edges."""
+    """(k, n): a_ij of the in-edges; less of those who have left."""
     leader: NDArray[np.int64]
     """(k,): 1 for a leader."""
     command: NDArray[np.float64]
@@ -93,8 +96,10 @@ class Autopilots(NamedTuple):
     """(k,): flight mode, see `link.flight_modes`."""
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
+    diagnosis: Diagnosis
+    cooperation: Cooperation
     events: EventList
-    """What leaders have to report, see `leader.drain_leader_events`."""
+    """What leaders, and UAVs that leave or change a belief, have to report, see `leader.drain_leader_events`."""
 
 
 class _Profiles(NamedTuple):
@@ -152,19 +157,28 @@ def _inbox_of(specs: Sequence[AutopilotSpec], values: int) -> tuple[Inbox, NDArr
     return inbox, weight
 
 
-def _leader_shares(scheme: Scheme) -> NDArray[np.int64]:
+def _leader_shares(scheme: Scheme, shared_width: int) -> NDArray[np.int64]:
     shares = [Reference._fields.index(quantity.name) for quantity in scheme.shared.get("leader", ())]
-    return np.array(shares + [-1] * (scheme.shared_width - len(shares)), np.int64)
+    return np.array(shares + [-1] * (shared_width - len(shares)), np.int64)
+
+
+def recorded_signals(spec: AutopilotSpec) -> tuple[Quantity, ...]:
+    """What an autopilot records, the same for all of a swarm: the scheme's signals, then those of diagnosis."""
+    beliefs = belief_signals(spec.diagnosis.actuators) if spec.diagnosis.on else ()
+    return (*find(spec.scheme).signals, *beliefs)
 
 
 def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, Inbox]:
     """Arrays for ``specs``, which share one scheme, before the first tick."""
     scheme: Scheme = find(specs[0].scheme)
     k = len(specs)
-    inbox, weight = _inbox_of(specs, scheme.shared_width)
+    diagnosis = new_diagnosis(specs, len(scheme.signals), scheme.shared_width)
+    diagnosed = any(spec.diagnosis.on for spec in specs)
+    shared_width = scheme.shared_width + (len(HEALTH_SHARED) if diagnosed else 0)
+    inbox, weight = _inbox_of(specs, shared_width)
     profiles = _profiles_of(specs, timing)
     leader = np.array([spec.role == "leader" for spec in specs], np.int64)
-    signals = np.zeros((k, len(scheme.signals)))
+    signals = np.zeros((k, len(recorded_signals(specs[0]))))
     signals[leader == 1] = math.nan
     autopilots = Autopilots(
         own=np.zeros((k, len(Own._fields))),
@@ -180,7 +194,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         leader=leader,
         command=np.array([spec.command for spec in specs], np.float64),
         target=np.zeros((k, len(PositionTarget._fields))),
-        shared=np.zeros((k, scheme.shared_width)),
+        shared=np.zeros((k, shared_width)),
         signals=signals,
         travel=np.array([spec.travel for spec in specs], np.float64),
         code=np.array([spec.attitude_code for spec in specs], np.float64),
@@ -190,11 +204,13 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         profile_commands=profiles.commands,
         profile_triggers=profiles.triggers,
         profile_state=profiles.state,
-        leader_shares=_leader_shares(scheme),
+        leader_shares=_leader_shares(scheme, shared_width),
         actuator=np.array([SLOT[name] for name in scheme.commands], np.int64),
         course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
         mode=np.full(k, MISSION),
         held_us=np.zeros(k, np.int64),
+        diagnosis=diagnosis,
+        cooperation=new_cooperation(specs, scheme, weight, profiles.parameters, shared_width),
         events=new_events(),
     )
     return autopilots, inbox

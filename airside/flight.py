@@ -69,6 +69,11 @@ def _hear(exchange, inbox, events, timing, i, now_us):
 
 
 @compiled_apart
+def _diagnose(autopilots, i, now_us, dt):
+    stages.diagnose(autopilots, i, now_us, dt)
+
+
+@compiled_apart
 def _refer(autopilots, inbox, i, now_us, period_us):
     stages.refer(autopilots, inbox, i, now_us, period_us)
 
@@ -89,6 +94,7 @@ def tick(group, timing, now_us):
     for i in every:
         if group.active[i] == 1:
             hear(group, timing, i, now_us)
+            diagnose(group, timing, i, now_us)
             refer(group, timing, i, now_us)
             control(group, timing, i, now_us)
             actuate(group, i, now_us)
@@ -122,6 +128,13 @@ def sense(group, i, now_us):
 def hear(group, timing, i, now_us):
     """Take the records that are due through the channel into the inbox."""
     _hear(group.exchange, group.inbox, group.link_events, timing, i, now_us)
+
+
+@compiled_within
+def diagnose(group, timing, i, now_us):
+    """What the UAV finds out about its own actuators; nothing where diagnosis is off."""
+    if group.autopilots.diagnosis.on[i] == 1:
+        _diagnose(group.autopilots, i, now_us, timing.period_us / 1e6)
 
 
 @compiled_within

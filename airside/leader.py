@@ -1,4 +1,4 @@
-"""A leader's tick: its profile, the target of its vehicle, and what it shares; the events that this makes."""
+"""A leader's tick: its profile, the target of its vehicle, and what it shares; the events that autopilots make."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import math
 from collections.abc import Sequence
 
 from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.diagnosis.beliefs import Belief
+from ftcc.airside.diagnosis.cooperation import BACK, LEFT, NO_ROOM, ROOM, makes_room, room_text
+from ftcc.airside.diagnosis.events import BELIEVES, belief_text
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import CLAMPED, FIRED, armed, refer, stand
 from ftcc.airside.spec import AutopilotSpec
+from ftcc.link.actuators import in_slots
 from ftcc.link.compiled import compiled, fields, store
 from ftcc.link.events import drain_events, note
 from ftcc.link.flight_modes import HOLD
@@ -57,7 +61,7 @@ def advance_leader(autopilots, inbox, i, now_us, period_us):
         refer(autopilots.profile[i], commands, triggers, state, reference, watched, clock, period_us)
         if state[FIRED] > fired:
             note(autopilots.events, now_us, i, _PASSED, int(fired))
-        if state[CLAMPED] > clamped:
+        if state[CLAMPED] > clamped and not makes_room(autopilots, i):
             note(autopilots.events, now_us, i, _HELD, int(reference[_Z_DOT] > 0.0))
     at = fields(Reference, reference)
     offset = autopilots.offset[i]
@@ -69,9 +73,20 @@ def advance_leader(autopilots, inbox, i, now_us, period_us):
 
 
 def drain_leader_events(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) -> list[tuple[int, int, str, str]]:
-    """Take the leaders' events since the last call: time us, UAV, severity, text."""
+    """Take the events of leaders, and of UAVs that leave, come back or change a belief, since the last call.
+
+    Returns time us, UAV, severity, text of each.
+    """
     events = []
-    for at_us, i, kind, number in drain_events(autopilots.events):
+    for row, (at_us, i, kind, number) in enumerate(drain_events(autopilots.events)):
+        if kind == BELIEVES:
+            actuator = in_slots(specs[i].diagnosis.actuators)[number]
+            before, *belief = autopilots.diagnosis.details[row].tolist()
+            events.append((at_us, specs[i].uav, *belief_text(actuator, before, Belief(*belief))))
+            continue
+        if kind in (ROOM, NO_ROOM, LEFT, BACK):
+            events.append((at_us, specs[i].uav, *room_text(kind, number)))
+            continue
         profile = specs[i].profile
         assert profile is not None
         if kind == _PASSED:

@@ -13,7 +13,7 @@ from ftcc.airside.elements.nonlinear import clip
 from ftcc.link.airframe import Airframe, with_inherited_fields
 from ftcc.link.compiled import compiled
 
-__all__ = ["Model", "airspeed_model", "flight_path_model", "level_deflections", "pitch_rate_model"]
+__all__ = ["Model", "airspeed_model", "flight_path_model", "level_deflections", "level_flight", "pitch_rate_model"]
 
 _LARGEST_ALPHA = 1.0
 """Guard of the angle of attack, rad."""
@@ -61,11 +61,19 @@ def pitch_rate_model(V, alpha, q, divisor, a):
     return drift, moment * a.Cmde
 
 
-def level_deflections(V: float, a: Model) -> dict[str, float]:
-    """Thrust (N) and elevator (rad) of level flight at airspeed ``V`` (m/s), by the nominal model."""
-    lifting = 0.5 * a.rho * max(V, _LEAST_AIRSPEED) ** 2 * a.S
+@compiled
+def level_flight(V, a):
+    """Angle of attack (rad), thrust (N) and elevator (rad) of level flight at airspeed ``V``, by the nominal model."""
+    speed = max(V, _LEAST_AIRSPEED)
+    lifting = 0.5 * a.rho * speed * speed * a.S
     # Here the elevator's lift counts: the pitching moment is balanced, Cm0 + Cma alpha + Cmde elevator = 0.
     share = a.CLde / a.Cmde
     alpha = (a.m * a.g / lifting - a.CL0 + share * a.Cm0) / (a.CLa - share * a.Cma)
     drag = lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha)
-    return {"thrust": drag / math.cos(alpha), "elevator": -(a.Cm0 + a.Cma * alpha) / a.Cmde}
+    return alpha, drag / math.cos(alpha), -(a.Cm0 + a.Cma * alpha) / a.Cmde
+
+
+def level_deflections(V: float, a: Model) -> dict[str, float]:
+    """Thrust (N) and elevator (rad) of level flight at airspeed ``V`` (m/s), by the nominal model."""
+    _, thrust, elevator = level_flight(V, a)
+    return {"thrust": thrust, "elevator": elevator}

@@ -9,15 +9,17 @@ clock it works on every state that arrives and on the newest records it has.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from types import ModuleType
 
+from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.compiled_stages import flight_of, stages_of
 from ftcc.airside.gcs import AutopilotView, GcsLink
 from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE, AutopilotGroup, build_group
 from ftcc.airside.leader import drain_leader_events
 from ftcc.airside.neighbourhood import Neighbourhood
+from ftcc.airside.scheme import Quantity
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import entry_of
@@ -37,10 +39,10 @@ _SUBSCRIPTIONS = 0.02
 """Wall time between two looks whether all neighbours have subscribed, s."""
 
 
-def columns(scheme: str) -> tuple[Column, ...]:
-    """Columns of an autopilot's part of the recording."""
-    signals = (Column(s.name, s.unit, s.meaning) for s in find(scheme).signals)
-    return (Column("t", "s", "simulated time"), Column("uav", "-", "id"), *signals)
+def columns(signals: Iterable[Quantity]) -> tuple[Column, ...]:
+    """Columns of an autopilot's part of the recording, for the signals that it records."""
+    recorded = (Column(s.name, s.unit, s.meaning) for s in signals)
+    return (Column("t", "s", "simulated time"), Column("uav", "-", "id"), *recorded)
 
 
 def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
@@ -79,7 +81,7 @@ class AutopilotProcess:
         self.flight = flight_of(specs[0].scheme)
         self.recorder = Recorder(
             [part_path(setting.folder, s.uav, "autopilot") if s.role == "follower" else None for s in specs],
-            columns(specs[0].scheme),
+            columns(recorded_signals(specs[0])),
             on_trouble=self.report_trouble,
         )
         self.link_recorder = Recorder(
@@ -99,6 +101,7 @@ class AutopilotProcess:
         self.waiter = Waiter()
         self.waiter.add(gate, gate.read)
         self.gcs_links = [GcsLink(self.view(i)) for i in range(len(specs))]
+        self.link_of = {spec.uav: link for spec, link in zip(specs, self.gcs_links, strict=True)}
         for link in self.gcs_links:
             for socket in link.sockets:
                 self.waiter.add(socket, partial(link.listen, socket))
@@ -172,6 +175,7 @@ class AutopilotProcess:
         if to_do & EVENTS:
             for at_us, uav, severity, text in drain_leader_events(self.group.autopilots, self.specs):
                 self.gate.report(EventReport(severity, text, uav, at_us))
+                self.link_of[uav].show_event(severity, text)
         if to_do & (TELEMETRY | SECOND):
             # What the log has of each simulated second is sent when this process is awake anyhow.
             self.send_telemetry()

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import Flight
+from ftcc.link.actuators import ACTUATORS
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
 
-__all__ = ["AutopilotSpec", "LinkEvent", "Neighbour", "OwnReference"]
+__all__ = ["AutopilotSpec", "DiagnosisSpec", "LinkEvent", "Neighbour", "OwnReference"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,25 @@ class OwnReference:
     parameters: tuple[float, ...] = ()
     commands: tuple[tuple[float, ...], ...] = ()
     """In order of time (s), which each begins with."""
+
+
+@dataclass(frozen=True)
+class DiagnosisSpec:
+    """Active fault tolerance of one UAV, and the nominal actuators that it is judged by."""
+
+    on: bool = False
+    accommodates: bool = False
+    """Whether the own law is told of known faults."""
+    cooperates: bool = False
+    """Whether the swarm makes room for a UAV that can do less."""
+    gains: tuple[float, ...] = ()
+    """In the order of `DiagnosisGains`."""
+    actuators: tuple[str, ...] = ()
+    """Those of the aircraft that a command moves."""
+    lag: tuple[float, ...] = (0.0,) * len(ACTUATORS)
+    """By slot, nominal bandwidth of the actuators, rad/s; 0 = none."""
+    damping: tuple[float, ...] = (0.0,) * len(ACTUATORS)
+    """By slot, nominal damping of second-order ones; 0 = first order."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +100,7 @@ class AutopilotSpec:
     """Ids of its out-neighbours."""
     tolerant_gains: tuple[float, ...] = ()
     """The same with fault tolerance on, where ``gains`` has it off."""
+    diagnosis: DiagnosisSpec = DiagnosisSpec()
     flight: Flight | None = None
     """What the scheme's conditions on gains are checked against, also in flight; None: no check."""
 

@@ -1,4 +1,6 @@
-"""What the stages of an autopilot's tick do: sense, hear, refer, control, publish. A template, see `instantiate`.
+"""What the stages of an autopilot's tick do: sense, hear, diagnose, refer, control, publish.
+
+A template, see `instantiate`.
 
 The free name ``scheme`` is the module of the control law, ``references`` that of its UAVs' own references.
 `compiled_stages.stages_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`:
@@ -9,6 +11,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_accommodated
+from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, is_apart, refer_apart
+from ftcc.airside.diagnosis.events import note_beliefs
+from ftcc.airside.diagnosis.health import share_health
+from ftcc.airside.diagnosis.stage import diagnose as _diagnose
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.leader import advance_leader
@@ -21,7 +28,7 @@ from ftcc.link.exchange import deliver_due, post
 from ftcc.link.flight_modes import HOLD
 from ftcc.link.messages import StateMessage
 
-__all__ = ["SWEEPS", "control", "hear", "predict_shared", "publish", "refer", "sense", "set_shared"]
+__all__ = ["SWEEPS", "control", "diagnose", "hear", "predict_shared", "publish", "refer", "sense", "set_shared"]
 
 # A template has no such names until `instantiate` gives them.
 if "scheme" not in globals():
@@ -56,6 +63,9 @@ _LARGEST = 1e30
 
 @compiled
 def _heard_by(autopilots, inbox, i):
+    if hears_virtual_leader(autopilots, i):
+        c = autopilots.cooperation
+        return Heard(c.records[i], c.edges[i, 0], c.edges[i, 1], c.edges[i, 2])
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
     return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
 
@@ -103,18 +113,32 @@ def hear(exchange, inbox, events, timing, i, now_us):
 
 
 @compiled
+def diagnose(autopilots, i, now_us, dt):
+    """What UAV ``i`` finds out about its own actuators, and what its law is told of it; nothing where it is off."""
+    if autopilots.diagnosis.on[i] == 1:
+        _diagnose(autopilots, i, now_us, dt)
+        note_beliefs(autopilots, i, now_us)
+        accommodate(autopilots, i, dt)
+
+
+@compiled
 def refer(autopilots, inbox, i, now_us, period_us):
     """Bring the reference of UAV ``i`` to this tick: a leader's profile, a follower's own reference.
 
     To be called once at every tick, after `hear`: a profile may wait for the position of another leader. In hold
     it stands still.
     """
+    if autopilots.diagnosis.cooperates[i] == 1:
+        cooperate(autopilots, inbox, i, now_us, period_us / 1e6)
     if autopilots.leader[i] == 1:
         advance_leader(autopilots, inbox, i, now_us, period_us)
         return
     if autopilots.mode[i] == HOLD:
         if _stand(autopilots.reference[i], period_us):
             autopilots.held_us[i] += period_us
+        return
+    if is_apart(autopilots, i):
+        refer_apart(autopilots, inbox, i, now_us, period_us)
         return
     parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
     _refer(parameters, commands, autopilots.reference[i], now_us - autopilots.held_us[i], period_us)
@@ -150,10 +174,12 @@ def control(autopilots, inbox, i, dt):
     Shared values and signals belong to the instant of the measurement. Returns False, and leaves the command as it was,
     if the law gives a command that is not finite.
     """
-    own = fields(Own, autopilots.own[i])
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
-    model = fields(Model, autopilots.model[i])
+    if is_accommodated(autopilots, i):
+        own, model = fields(Own, autopilots.diagnosis.own[i]), fields(Model, autopilots.diagnosis.model[i])
+    else:
+        own, model = fields(Own, autopilots.own[i]), fields(Model, autopilots.model[i])
     _start_law(autopilots, inbox, i, own, reference, gains)
     before = fields(_State, autopilots.state[i])
     after, output = _step(before, own, _heard_by(autopilots, inbox, i), reference, model, gains, dt)
@@ -166,7 +192,8 @@ def control(autopilots, inbox, i, dt):
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
     _set_signals(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
-        autopilots.command[i, autopilots.actuator[n]] = shown[n]
+        slot = autopilots.actuator[n]
+        autopilots.command[i, slot] = command_for(autopilots, i, slot, shown[n])
     if autopilots.course[i] == autopilots.course[i]:
         hold_course(own, autopilots.course[i], model, autopilots.command[i])
     return True
@@ -175,4 +202,5 @@ def control(autopilots, inbox, i, dt):
 @compiled
 def publish(autopilots, exchange, events, i, sequence, now_us):
     """Post what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
+    share_health(autopilots, i)
     post(exchange, i, sequence, now_us, events.radio_on[i], autopilots.shared[i])

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ftcc.link.compiled import compiled, store
 
-__all__ = ["EventList", "drain_events", "new_events", "note"]
+__all__ = ["CAPACITY", "EventList", "drain_events", "new_events", "note"]
 
-_ROOM = 256
+CAPACITY = 1024
+"""Rows of a list."""
 
 
 class EventRow(NamedTuple):
@@ -38,7 +39,7 @@ class EventList(NamedTuple):
 
 def new_events() -> EventList:
     """An empty list."""
-    return EventList(np.zeros((_ROOM, len(EventRow._fields)), np.int64), np.zeros(1, np.int64))
+    return EventList(np.zeros((CAPACITY, len(EventRow._fields)), np.int64), np.zeros(1, np.int64))
 
 
 @compiled

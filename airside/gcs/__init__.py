@@ -6,6 +6,6 @@ from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.commands import COMMANDS
 from ftcc.airside.gcs.gcs_link import GcsLink
 from ftcc.airside.gcs.requests import MESSAGES
-from ftcc.airside.gcs.streams import LINK_FIELDS
+from ftcc.airside.gcs.streams import BELIEF_FIELDS, LINK_FIELDS
 
-__all__ = ["COMMANDS", "LINK_FIELDS", "MESSAGES", "AutopilotView", "GcsLink"]
+__all__ = ["BELIEF_FIELDS", "COMMANDS", "LINK_FIELDS", "MESSAGES", "AutopilotView", "GcsLink"]

@@ -66,6 +66,11 @@ class AutopilotView:
         return self.spec.role == "leader"
 
     @property
+    def diagnosed(self) -> bool:
+        """Whether it diagnoses its own actuators."""
+        return bool(self.autopilots.diagnosis.on[self.i])
+
+    @property
     def home(self) -> Home:
         """Where the swarm flies."""
         return Home(*self.setting.home)

@@ -29,6 +29,13 @@ _HEARTBEAT = 1.0
 _TURNED_AWAY = 10.0
 """Least wall time between two complaints that there are too many clients, s."""
 
+_SEVERITIES = {
+    "info": dialect.MAV_SEVERITY_INFO,
+    "warning": dialect.MAV_SEVERITY_WARNING,
+    "error": dialect.MAV_SEVERITY_ERROR,
+}
+"""Severities of events as STATUSTEXT has them."""
+
 
 class GcsLink:
     """All that one autopilot has to do with the ground."""
@@ -115,6 +122,11 @@ class GcsLink:
             self.view.alive = False
             self._last_heartbeat = 0.0
             self.attend()
+
+    def show_event(self, severity: str, text: str) -> None:
+        """Show an event of this UAV, which the log has from elsewhere, on all ground stations: STATUSTEXT."""
+        send = self.services.outbox.send_text
+        self._guard.run("STATUSTEXT", partial(send, _SEVERITIES[severity], text))
 
     # From the ground.
 

@@ -14,17 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from ftcc.airside.diagnosis.gains import DIAGNOSIS_RANGES, DiagnosisGains
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.schedule import SLOWEST
 from ftcc.airside.gcs.streams import STREAMS
 from ftcc.airside.gcs.telemetry import Telemetry
 from ftcc.airside.references.position import Fire, change_from_ground, newest
-from ftcc.airside.scheme import FAULT_TOLERANCE, quantities
+from ftcc.airside.scheme import FAULT_TOLERANCE, Quantity, quantities
 from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
 from ftcc.link.mavlink import as_typed, dialect
 
-__all__ = ["Parameter", "Parameters", "RefusedError"]
+__all__ = ["Parameter", "Parameters", "RefusedError", "diagnosis_parameter"]
 
 _INTEGER = dialect.MAV_PARAM_TYPE_INT32
 _FLOAT = dialect.MAV_PARAM_TYPE_REAL32
@@ -72,8 +73,9 @@ class Parameters:
             *_sizes(view),
             *_channel(view),
             *_fire(view),
-            *_rates(telemetry),
+            *_rates(view, telemetry),
             *_gains(view),
+            *_diagnosis(view),
         ]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
@@ -238,7 +240,7 @@ def _fire(view: AutopilotView) -> Iterator[Parameter]:
     yield one("FIRE_DRIFT_E", "drift_east", 0.99 * limit, "m/s east")
 
 
-def _rates(telemetry: Telemetry) -> Iterator[Parameter]:
+def _rates(view: AutopilotView, telemetry: Telemetry) -> Iterator[Parameter]:
     def one(n: int, name: str) -> Parameter:
         def write(value: float) -> None:
             if 0.0 < value < SLOWEST:
@@ -247,7 +249,7 @@ def _rates(telemetry: Telemetry) -> Iterator[Parameter]:
 
         return Parameter(f"SR_{name}", lambda: telemetry.default_rate(n), write, 0.0, 1000.0, meaning="Hz, 0: silent")
 
-    return (one(n, stream.name) for n, stream in enumerate(STREAMS))
+    return (one(n, stream.name) for n, stream in enumerate(STREAMS) if view.diagnosed or not stream.diagnosed_only)
 
 
 def _gains(view: AutopilotView) -> Iterator[Parameter]:
@@ -293,3 +295,52 @@ def _gains(view: AutopilotView) -> Iterator[Parameter]:
         yield Parameter(
             "FTCC_FT", lambda: float(view.fault_tolerance), set_tolerance, 0, 1, True, "1: fault tolerance on"
         )
+
+
+_SHORT = {
+    "effectiveness": "eff",
+    "coefficient": "coef",
+    "frequency": "freq",
+    "elevator": "ele",
+    "aileron": "ail",
+    "rudder": "rud",
+    "thrust": "thr",
+    "load_factor": "load",
+}
+"""Words of settings that are shortened in their parameters, whose names have at most 16 characters."""
+_OF_LEADERS = ("fresh", "silent", "room", "room_pace")
+"""Settings that a leader makes room by."""
+
+
+def diagnosis_parameter(setting: str) -> str:
+    """Name of the parameter of a setting of diagnosis: ``FDI_DRIFT_ELE`` for ``drift_elevator``."""
+    for word, short in _SHORT.items():
+        setting = setting.replace(word, short)
+    return f"FDI_{setting.upper()}"
+
+
+def _diagnosis(view: AutopilotView) -> Iterator[Parameter]:
+    """Settings of fault detection and isolation, and of making room, where the swarm diagnoses its faults."""
+    if not view.spec.diagnosis.on:
+        return
+    in_force = view.autopilots.diagnosis.gains[view.i]
+    ranges = {name: allowed for allowed, names in DIAGNOSIS_RANGES.items() for name in names.split()}
+
+    def one(n: int, name: str, note: Quantity) -> Parameter:
+        announced, allowed = diagnosis_parameter(name), ranges[name]
+
+        def write(value: float) -> None:
+            if refusal := allowed.refusal(value):
+                raise RefusedError(f"{announced} {value:g}: {refusal}")
+            in_force[n] = value
+
+        def read() -> float:
+            return float(in_force[n])
+
+        return Parameter(
+            announced, read, write, allowed.least, min(allowed.most, _ANY), meaning=f"{note.meaning}, {note.unit}"
+        )
+
+    for n, (name, note) in enumerate(quantities(DiagnosisGains).items()):
+        if name in _OF_LEADERS or not view.leader:
+            yield one(n, name, note)

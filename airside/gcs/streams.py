@@ -6,11 +6,14 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from ftcc.airside.diagnosis.beliefs import UNDETERMINED, Belief
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.references.attitude import Reference as AttitudeReference
-from ftcc.link.actuators import THRUST
+from ftcc.link.actuators import ACTUATORS, THRUST
 from ftcc.link.channel import Channel, Edge
 from ftcc.link.compiled import fields
 from ftcc.link.flight_modes import custom_mode
@@ -19,6 +22,7 @@ from ftcc.link.messages import StateMessage
 from ftcc.link.rotation import body_attitude
 
 __all__ = [
+    "BELIEF_FIELDS",
     "LINK_FIELDS",
     "LOGGED",
     "ON_REQUEST",
@@ -32,6 +36,9 @@ __all__ = [
 
 LINK_FIELDS = ("sender", "age", "received", "lost", "cut")
 """Numbers per in-edge in the DEBUG_FLOAT_ARRAY "links"; age -1 = never heard."""
+
+BELIEF_FIELDS = Belief._fields[: Belief._fields.index("suspected_at")]
+"""Numbers per slot of an actuator in the DEBUG_FLOAT_ARRAY "beliefs"; state -1 = no such actuator. `Health` follows."""
 
 _M = dialect
 _RATES, _POSITION = (StateMessage._fields.index(name) for name in ("rollspeed", "x"))
@@ -140,6 +147,11 @@ _SENSORS = (
 )
 
 
+def _knows_of_a_fault(view: AutopilotView) -> bool:
+    """Whether the UAV believes that something is wrong with an actuator."""
+    return bool((view.autopilots.diagnosis.belief[view.i, :, BELIEF_FIELDS.index("state")] >= UNDETERMINED).any())
+
+
 def _sys_status(view: AutopilotView) -> Any:
     lost = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], _LOST].sum())
     received = int(view.inbox.edges[view.i, : view.inbox.degree[view.i], _RECEIVED].sum())
@@ -147,8 +159,15 @@ def _sys_status(view: AutopilotView) -> Any:
     # No battery is modelled: unknown voltage and current, 100 % so that no client raises an alarm.
     # There is no fence; one that does not count as healthy is announced as breached.
     healthy = _SENSORS | _M.MAV_SYS_STATUS_GEOFENCE
+    present = _SENSORS
+    if view.diagnosed:
+        present |= _M.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        healthy |= _M.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        if _knows_of_a_fault(view):
+            # Clients that know no outputs, such as MAVSDK, read the check before arming: nobody would take off so.
+            healthy &= ~(_M.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS | _M.MAV_SYS_STATUS_PREARM_CHECK)
     return _M.MAVLink_sys_status_message(
-        _SENSORS, _SENSORS, healthy, 0, 65535, -1, 100, share, min(65535, lost), 0, 0, 0, 0
+        present, present, healthy, 0, 65535, -1, 100, share, min(65535, lost), 0, 0, 0, 0
     )
 
 
@@ -235,6 +254,18 @@ def _signals(view: AutopilotView) -> Any:
     return float_array(view.now_us, "signals", view.autopilots.signals[view.i].tolist())
 
 
+def _beliefs(view: AutopilotView) -> Any:
+    diagnosis, i = view.autopilots.diagnosis, view.i
+    # Without diagnosis there are no beliefs: no actuator is known.
+    rows = np.zeros((len(ACTUATORS), len(BELIEF_FIELDS)))
+    believed = diagnosis.belief[i]
+    rows[: len(believed)] = believed[:, : len(BELIEF_FIELDS)]
+    unknown = (diagnosis.has[i] == 0) | (len(believed) == 0)
+    rows[unknown] = 0.0
+    rows[unknown, BELIEF_FIELDS.index("state")] = -1.0
+    return float_array(view.now_us, "beliefs", rows.ravel().tolist() + diagnosis.health[i].tolist())
+
+
 def _links(view: AutopilotView) -> Any:
     inbox, i = view.inbox, view.i
     values: list[float] = []
@@ -266,8 +297,14 @@ class Stream(NamedTuple):
     """Hz towards the swarm's own station, which logs everything."""
     make: Callable[[AutopilotView], Any]
     followers_only: bool = False
+    diagnosed_only: bool = False
+    """Only of UAVs that diagnose their actuators."""
     logged: float = 0.0
     """Hz of simulated time that the station has at least, also where the swarm flies faster than the clock."""
+
+    def of(self, view: AutopilotView) -> bool:
+        """Whether a UAV has it."""
+        return not (self.followers_only and view.leader) and (view.diagnosed or not self.diagnosed_only)
 
 
 STREAMS = (
@@ -284,6 +321,7 @@ STREAMS = (
     Stream("ATT_TARGET", _M.MAVLINK_MSG_ID_ATTITUDE_TARGET, 2.0, 0.0, _attitude_target),
     Stream("POS_TARGET", _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED, 2.0, 0.0, _position_target),
     Stream("SIGNALS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 10.0, _signals, followers_only=True),
+    Stream("BELIEFS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 0.0, _beliefs, diagnosed_only=True),
     Stream("LINKS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 1.0, 10.0, _links),
     Stream("HOME", _M.MAVLINK_MSG_ID_HOME_POSITION, 0.5, 0.0, _home_position),
 )
@@ -296,19 +334,12 @@ LOGGED = tuple(stream.logged for stream in STREAMS)
 
 def rates_of(view: AutopilotView, station: bool) -> list[float]:
     """Rates in the order of `STREAMS`, Hz, towards a ground station or the swarm's own."""
-    return [
-        0.0 if stream.followers_only and view.leader else stream.to_station if station else stream.rate
-        for stream in STREAMS
-    ]
+    return [(stream.to_station if station else stream.rate) if stream.of(view) else 0.0 for stream in STREAMS]
 
 
 def places_of(view: AutopilotView, message: float) -> list[int]:
     """Places in `STREAMS` of a message, by its number, that this UAV has."""
-    return [
-        n
-        for n, stream in enumerate(STREAMS)
-        if stream.message == message and not (stream.followers_only and view.leader)
-    ]
+    return [n for n, stream in enumerate(STREAMS) if stream.message == message and stream.of(view)]
 
 
 def _autopilot_version(view: AutopilotView) -> Any:

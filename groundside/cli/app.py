@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ftcc.groundside.cli import airframe, failures, fly, ground, results, scenarios, search, study, swarms, view
+from ftcc.groundside.cli import (
+    airframe,
+    calibrate,
+    failures,
+    fly,
+    ground,
+    results,
+    scenarios,
+    search,
+    study,
+    swarms,
+    view,
+)
 from ftcc.groundside.cli.common import fail, warn
 from ftcc.groundside.cli.examples import EXAMPLES
 from ftcc.groundside.cli.map import map_
@@ -35,6 +47,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         study.study,
         map_,
         search.search,
+        calibrate.calibrate,
         airframe.airframe,
     ),
     "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),

@@ -13,6 +13,7 @@ EXAMPLES = {
     "ftcc study": "ftcc study containment --vary channel.loss=0,.1,.3 --seeds 20",
     "ftcc map": "ftcc map demo --x faults.0.effectiveness=.1:1:9 --y faults.0.bias=-.5:.5:9",
     "ftcc search": "ftcc search demo --over 'channel.loss=uniform(low=0, high=.9)'",
+    "ftcc calibrate": "ftcc calibrate containment --hours 20",
     "ftcc airframe": "ftcc airframe --airspeed 25 --airspeed 30 --coefficient CLde=1.1",
     "ftcc fly": "ftcc fly containment --speed 5 --viewer none --duration 60",
     "ftcc ps": "ftcc ps",

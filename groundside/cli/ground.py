@@ -35,6 +35,8 @@ __all__ = [
 ]
 
 _REFUSED = 1
+_SNAPSHOT_TIMEOUT = 2.0
+"""Longest wait for what the swarm's station knows, wall s."""
 
 Swarm = Annotated[
     str | None, typer.Option("--swarm", help="Name of the swarm, see `ftcc ps`; needed if several are running.")
@@ -70,8 +72,28 @@ def _say(text: str) -> None:
     terminal().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
+def _faults_and_beliefs(name: str) -> dict[int, tuple[str, str]]:
+    """Of each UAV that diagnoses its actuators the faults that it has, and those that it believes to have."""
+    from ftcc.groundside.dashboard import describe_beliefs, describe_faults, watch_swarm
+
+    try:
+        snapshot = next(watch_swarm(name, _SNAPSHOT_TIMEOUT), None)
+    except OSError:
+        # The swarm's station is busy or has ended: the UAVs answer for themselves.
+        return {}
+    uavs = snapshot.uavs if snapshot else {}
+    words = {}
+    for uav, state in uavs.items():
+        if believed := describe_beliefs(state, state.effectiveness):
+            words[uav] = (describe_faults(state) or "healthy", believed)
+    return words
+
+
 def vehicles(swarm: Swarm = None, key: Key = None) -> None:
-    """List the UAVs of a running swarm, with the UDP port and the present state of each."""
+    """List the UAVs of a running swarm, with the UDP port and the present state of each.
+
+    Where they diagnose their actuators, also what faults each believes to have, beside those that it has.
+    """
     from rich.table import Table
 
     from ftcc.groundside.swarm import NoAnswerError
@@ -79,6 +101,10 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
     table = Table("UAV", "port", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
     silent = False
     with _station(swarm, key) as station:
+        words = _faults_and_beliefs(station.entry.name)
+        if words:
+            table.add_column("has")
+            table.add_column("believes")
         for uav, state in zip(station.uavs, station.vehicles(), strict=True):
             card = station.card(uav)
             if isinstance(state, NoAnswerError):
@@ -87,7 +113,7 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
                 continue
             tolerance = {None: "", True: "on", False: "off"}[state.fault_tolerance]
             numbers = (f"{state.t:.2f}", f"{state.altitude:.2f}", f"{state.airspeed:.2f}")
-            table.add_row(str(uav), str(card.port), state.role, state.mode, *numbers, tolerance)
+            table.add_row(str(uav), str(card.port), state.role, state.mode, *numbers, tolerance, *words.get(uav, ()))
     terminal().print(table)
     if silent:
         raise typer.Exit(2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ftcc.groundside.dashboard.attitudes import Attitudes
 from ftcc.groundside.dashboard.blueprints import blueprint
 from ftcc.groundside.dashboard.detail import Detail
+from ftcc.groundside.dashboard.diagnosis import DiagnosisPanel
 from ftcc.groundside.dashboard.pace import PaceCurve
 from ftcc.groundside.dashboard.plots import Plots
 from ftcc.groundside.dashboard.scene import Scene
@@ -26,13 +27,15 @@ class Artists:
         self._scene = Scene(subject, first, self._detail)
         self._attitudes = Attitudes(subject, self._detail) if subject.family == "attitude" else None
         self._plots = Plots(subject, self._detail)
+        self._diagnosis = DiagnosisPanel(subject, self._detail) if subject.diagnosed else None
         self._table = Table(subject, self._detail)
 
     def static(self) -> list[Entry]:
         """Return the entries that are logged once, the blueprint first."""
         attitudes = self._attitudes.static() if self._attitudes is not None else []
         pace = self._pace.static() if self._pace is not None else []
-        return [self._layout(), *self._scene.static(), *attitudes, *self._plots.static(), *pace]
+        beliefs = self._diagnosis.static() if self._diagnosis is not None else []
+        return [self._layout(), *self._scene.static(), *attitudes, *self._plots.static(), *beliefs, *pace]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """Return the entries of one snapshot and its events."""
@@ -40,6 +43,9 @@ class Artists:
         entries = [*self._scene.draw(snapshot, new), *self._plots.draw(snapshot, new), *self._table.draw(snapshot)]
         if self._attitudes is not None:
             entries += self._attitudes.draw(snapshot, new)
+        if self._diagnosis is not None:
+            # A UAV that is drawn in full from now on gets a tab.
+            entries += [*([self._layout()] if new else []), *self._diagnosis.draw(snapshot, new)]
         return entries + self._draw_pace(snapshot) + event_entries(snapshot.events)
 
     def _draw_pace(self, snapshot: Snapshot) -> list[Entry]:
@@ -52,5 +58,5 @@ class Artists:
         return [self._layout(), *self._pace.static(), *self._pace.draw(snapshot)]
 
     def _layout(self) -> Entry:
-        layout = blueprint(self._scene, self._attitudes, self._plots, self._table, self._pace)
+        layout = blueprint(self._scene, self._attitudes, self._plots, self._table, self._pace, self._diagnosis)
         return Entry(BLUEPRINT, None, layout)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.labels import label
+from ftcc.groundside.dashboard.marks import HealthMarks
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
@@ -57,6 +58,9 @@ class Attitudes:
         self._turns = {
             uav: _rotation_between(-self._eye, np.array(slot) - self._eye) for uav, slot in self._slots.items()
         }
+        places = {uav: np.array(slot) for uav, slot in self._slots.items() if uav not in self._leaders}
+        self._places = places if subject.diagnosed else {}
+        self._marks = HealthMarks("/attitudes/health", 0.12 * SPAN, 0.35 * SPAN)
         self._poses = Poses()
         self._labels: dict[int, str] = {}
         self._outlined: set[int] = set()
@@ -94,6 +98,7 @@ class Attitudes:
     def draw(self, snapshot: Snapshot, new: Sequence[int] = ()) -> list[Entry]:
         """Return everything that moves; ``new`` are the UAVs that are drawn in full from now on."""
         entries = self._shapes(new) + self._sticks(snapshot)
+        entries += self._marks.draw(snapshot, self._places, moving=False)
         for uav in self._detail.shown:
             text = label(uav, uav in self._leaders, snapshot)
             if text != self._labels.get(uav):

@@ -10,6 +10,7 @@ from ftcc.groundside.dashboard.table import log_view
 
 if TYPE_CHECKING:
     from ftcc.groundside.dashboard.attitudes import Attitudes
+    from ftcc.groundside.dashboard.diagnosis import DiagnosisPanel
     from ftcc.groundside.dashboard.pace import PaceCurve
     from ftcc.groundside.dashboard.plots import Plots
     from ftcc.groundside.dashboard.scene import Scene
@@ -22,12 +23,18 @@ _BESIDE = 4
 
 
 def blueprint(
-    scene: Scene, attitudes: Attitudes | None, plots: Plots, table: Table, pace: PaceCurve | None
+    scene: Scene,
+    attitudes: Attitudes | None,
+    plots: Plots,
+    table: Table,
+    pace: PaceCurve | None,
+    diagnosis: DiagnosisPanel | None = None,
 ) -> rrb.Blueprint:
     """Return the layout for the viewer and the recording."""
     swarm = scene.view()
     groups = plots.views()
-    first = groups.pop("Tracking")
+    tracking = _stack(groups.pop("Tracking"), "Tracking")
+    above = tracking if diagnosis is None else rrb.Tabs(tracking, diagnosis.view())
     tabs = [_stack(views, name) for name, views in groups.items()]
     tabs += [_stack([pace.view()], "Pace")] if pace is not None else []
     return rrb.Blueprint(
@@ -41,7 +48,7 @@ def blueprint(
                 ),
                 row_shares=[6, 5],
             ),
-            rrb.Vertical(_stack(first, "Tracking"), rrb.Tabs(*tabs), row_shares=[3, 2]),
+            rrb.Vertical(above, rrb.Tabs(*tabs), row_shares=[3, 2]),
             column_shares=[3, 2],
         ),
         rrb.TopPanel(state=rrb.PanelState.Collapsed),

@@ -115,15 +115,20 @@ class Feed:
         self._path.unlink(missing_ok=True)
 
 
-def watch_swarm(name: str) -> Iterator[Snapshot]:
+def watch_swarm(name: str, timeout: float | None = None) -> Iterator[Snapshot]:
     """Yield the snapshots of a running swarm from now on, until it ends.
+
+    Parameters
+    ----------
+    timeout : longest wait for the next one, wall s; None: for ever.
 
     Raises
     ------
     OSError
-        If the swarm cannot be reached.
+        If the swarm cannot be reached, or the next one does not come in time.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+        link.settimeout(timeout)
         link.connect(str(feed_path(name)))
         with link.makefile("rb") as lines, contextlib.suppress(ConnectionResetError):
             for line in lines:

@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
+from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, KINDS, STATES, UNDETERMINED
 from ftcc.groundside.dashboard.snapshot import Pace, Snapshot, UavState
 
-__all__ = ["describe_faults", "describe_silence", "faulty_actuators", "in_trouble", "is_silent", "label", "name"]
+__all__ = [
+    "HEALTH",
+    "LEFT",
+    "believed_state",
+    "describe_beliefs",
+    "describe_faults",
+    "describe_silence",
+    "faulty_actuators",
+    "health_of",
+    "in_trouble",
+    "is_silent",
+    "label",
+    "name",
+]
+
+HEALTH = (*STATES, "left")
+"""What a UAV says of itself: the most severe state of its actuators, or that it has left the swarm."""
+LEFT = len(STATES)
 
 _SILENT = 1.0
 """Age of a UAV's telemetry from which it counts as silent, s; wall time if it flies faster than real time."""
@@ -67,5 +86,39 @@ def _fastest(pace: Pace | None) -> float:
 
 
 def in_trouble(uav: UavState, snapshot: Snapshot) -> bool:
-    """Return whether a UAV has an actuator fault or is silent."""
-    return is_silent(uav, snapshot) or bool(faulty_actuators(uav))
+    """Return whether a UAV has an actuator fault, believes to have one, or is silent."""
+    return is_silent(uav, snapshot) or bool(faulty_actuators(uav)) or (health_of(uav) or HEALTHY) >= UNDETERMINED
+
+
+def health_of(uav: UavState) -> int | None:
+    """Return what a UAV says of itself, index into `HEALTH`; None if it does not diagnose, or has not yet."""
+    worst = uav.signals.get("health", math.nan)
+    if not math.isfinite(worst):
+        return None
+    return LEFT if uav.signals.get("belongs") == 0.0 else int(worst)
+
+
+def believed_state(uav: UavState, actuator: str) -> str:
+    """Return what a UAV believes of an actuator: the kind of its fault, else its state; empty if it is not known."""
+    state = uav.signals.get(f"health_{actuator}", math.nan)
+    if not math.isfinite(state):
+        return ""
+    return KINDS[int(uav.signals[f"kind_{actuator}"])] if state == FAULTY else STATES[int(state)]
+
+
+def describe_beliefs(uav: UavState, actuators: Iterable[str]) -> str:
+    """Describe what a UAV believes of its actuators, such as "elevator loss 62 % +0.01"; empty if it does not."""
+    health = health_of(uav)
+    if health is None:
+        return ""
+    words = ["left the swarm"] if health == LEFT else []
+    for actuator in actuators:
+        state = believed_state(uav, actuator)
+        if state in ("", STATES[HEALTHY]):
+            continue
+        text = f"{actuator.replace('_', ' ')} {state}"
+        if uav.signals[f"health_{actuator}"] == FAULTY:
+            share, bias = uav.signals[f"effectiveness_hat_{actuator}"], uav.signals[f"bias_hat_{actuator}"]
+            text += f" {100.0 * share:.0f} % {bias:+.2g}"
+        words.append(text)
+    return "; ".join(words) or STATES[HEALTHY]

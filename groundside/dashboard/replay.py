@@ -75,7 +75,7 @@ def snapshots_of(run: Run, rate: float = RATE) -> Iterator[Snapshot]:
     """Yield snapshots of a run at ``rate`` (Hz, simulated time), from its start to its last recorded row."""
     mission = run.mission
     plant = find(mission.plant)
-    signals = [quantity.name for quantity in mission.scheme.signals]
+    signals = [quantity.name for quantity in mission.signals]
     names = {
         "truth": {name: name for name in TRUTH},
         "command": {name: f"{name}_command" for name in plant.ACTUATORS},

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.labels import is_silent, label
 from ftcc.groundside.dashboard.links import Links
+from ftcc.groundside.dashboard.marks import MARKS_NOTE, HealthMarks
 from ftcc.groundside.dashboard.shapes import SPAN, Poses, airframe, outline, stick_colors, sticks
 from ftcc.groundside.dashboard.snapshot import Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
@@ -82,6 +83,8 @@ class Scene:
         self._others: list[int] = []
         """UAVs drawn as sticks in the previous snapshot."""
         self._labels: dict[int, str] = {}
+        size = 0.25 * self._scale * SPAN
+        self._marks = HealthMarks("/world/health", size, 2.2 * size) if subject.diagnosed else None
         self._poses = Poses()
 
     @property
@@ -92,6 +95,7 @@ class Scene:
         notes += [f"side by side at {LANE:g} m{ranks}"] if self._lanes.any() else []
         notes += ["outlines: references"] if self._references else []
         notes += self._surroundings.notes
+        notes += [MARKS_NOTE] if self._marks is not None else []
         return "Swarm about its moving centre" + (f" ({', '.join(notes)})" if notes else "")
 
     def view(self) -> rrb.Spatial3DView:
@@ -170,6 +174,9 @@ class Scene:
                 self._labels[uav] = text
                 shown = rr.Points3D.from_fields(labels=text, show_labels=True)
                 entries.append(Entry(f"/world/uav/{uav}/label", t, shown))
+        if self._marks is not None:
+            places = {uav: after[row] for uav, row in self._index.items() if known[row] and uav not in self._leaders}
+            entries += self._marks.draw(snapshot, places)
         entries += self._surroundings.draw(snapshot, self._framed_positions(snapshot))
         return entries + self.links.draw(snapshot, after, 0.5 * self._scale * SPAN)
 

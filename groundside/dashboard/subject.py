@@ -40,6 +40,8 @@ class Subject:
     obstacles: tuple[Obstacle, ...] = ()
     fire: Fire | None = None
     """Fire that the swarm flies around; the scheme's signals give its centre."""
+    diagnosed: tuple[str, ...] = ()
+    """Actuators that followers diagnose; empty without diagnosis."""
     stale_after: float = 0.5
     """Age of the newest record from which a link counts as stale, s."""
 
@@ -52,11 +54,12 @@ class Subject:
             title=mission.title,
             family=_family(mission),
             graph=mission.graph,
-            signals=mission.scheme.signals,
+            signals=mission.signals,
             limits={name: follower.limits[SLOT[name]] for name in mission.scheme.commands},
             disturbances=plant.DISTURBANCES,
             obstacles=mission.obstacles,
             fire=mission.fire,
+            diagnosed=next((spec.diagnosis.actuators for spec in mission.autopilots if spec.diagnosis.on), ()),
         )
 
     @property

@@ -10,6 +10,7 @@ from rerun.blueprint.encodings import TimelineColumn
 
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.labels import (
+    describe_beliefs,
     describe_faults,
     describe_silence,
     faulty_actuators,
@@ -52,7 +53,8 @@ class Table:
         return [Entry("/swarm", snapshot.t, rr.TextDocument(self._text(snapshot), media_type="text/markdown"))]
 
     def _text(self, snapshot: Snapshot) -> str:
-        heads = ("UAV", "altitude, m", "speed, m/s", "actuators", "links up", "late ticks", "mode")
+        believes = ["believes"] if self._subject.diagnosed else []
+        heads = ("UAV", "altitude, m", "speed, m/s", "actuators", *believes, "links up", "late ticks", "mode")
         rows = [heads, ("---",) * len(heads), *(self._row(uav, snapshot) for uav in self._uavs_in_rows(snapshot))]
         # A recording has no modes.
         shown = len(heads) if any(state.mode for state in snapshot.uavs.values()) else -1
@@ -89,11 +91,13 @@ class Table:
         label = f"{uav} leader" if leads else f"{uav}"
         state = snapshot.uavs.get(uav)
         if state is None:
-            return (label, "", "", "no telemetry", "", "", "")
+            return (label, "", "", "no telemetry", *[""] * bool(self._subject.diagnosed), "", "", "")
         silent = describe_silence(state, snapshot)
         health = silent or describe_faults(state) or ("" if leads else "healthy")
         z, speed = state.truth["z"], state.truth["V"]
-        return (label, f"{z:.1f}", f"{speed:.2f}", health, _describe_links(state), str(state.late), state.mode)
+        believes = [describe_beliefs(state, self._subject.diagnosed)] if self._subject.diagnosed else []
+        links = _describe_links(state)
+        return (label, f"{z:.1f}", f"{speed:.2f}", health, *believes, links, str(state.late), state.mode)
 
 
 def _describe_links(state: UavState) -> str:

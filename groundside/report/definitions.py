@@ -146,7 +146,7 @@ def plain_sheet(mission: Mission) -> Sheet:
     ]
     figures = [Figure(name="motion", title="Motion", panels=motion)]
     errors, estimates = [], []
-    for signal in mission.scheme.signals:
+    for signal in mission.signals:
         panel = Panel(y=signal.name, label=signal.meaning or signal.name, unit=signal.unit)
         if signal.bound is not None:
             errors.append(panel.model_copy(update={"bound": str(signal.bound)}))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ftcc.groundside.canvas import Drawn
 
 __all__ = [
+    "AT_TOP",
     "Cell",
     "Head",
     "Page",
@@ -29,6 +30,10 @@ __all__ = [
     "write",
     "write_html",
 ]
+
+
+AT_TOP = ("verdict", "claims", "faults", "alarms")
+"""Anchors of the sections before the figures."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class Page:
         """Return anchors and titles of the sections."""
         found = [(section.anchor, section.title) for section in self.sections]
         if self.figures:
-            before = sum(anchor in ("verdict", "claims") for anchor, _ in found)
+            before = sum(anchor in AT_TOP for anchor, _ in found)
             found.insert(before, ("figures", "Figures"))
         if self.scenario:
             found.append(("scenario", "Scenario as flown"))
@@ -87,7 +92,7 @@ class Page:
 
 def write(page: Page, path: Path) -> Path:
     """Write a page as one HTML file that includes its figures, and return its path."""
-    return write_html("page.html.jinja", path, **vars(page), contents=page.contents)
+    return write_html("page.html.jinja", path, **vars(page), contents=page.contents, at_top=AT_TOP)
 
 
 def write_html(template: str, path: Path, beside: Path | None = None, **content: Any) -> Path:

@@ -10,6 +10,7 @@ from ftcc.groundside.canvas import Drawn, save
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import Sheet, sheet_of
+from ftcc.groundside.report.diagnosis import diagnosis_sections
 from ftcc.groundside.report.drawing import draw, draw_timeline
 from ftcc.groundside.report.links import links_section
 from ftcc.groundside.report.page import (
@@ -26,6 +27,7 @@ from ftcc.groundside.report.page import (
 )
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.results import NothingRecordedError, Run, sole_writer
+from ftcc.groundside.verdict import is_diagnosed
 
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
@@ -88,6 +90,8 @@ def _write(run: Run, folder: Path) -> Path:
     if signals is run:
         page.sections.append(verdict_section(run.verdict))
     page.sections.append(claims_section(results, mission.case))
+    if signals is run and is_diagnosed(mission):
+        page.sections += diagnosis_sections(run, folder)
     if sheet.source and mission.name in sheet.scenarios:
         compared = compare(sheet, flown)
         page.sections.append(compared_section(compared, sheet.source, mission.form, mission.variants, sheet.notes))

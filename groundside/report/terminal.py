@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ftcc.groundside.claims import Result
 from ftcc.groundside.results import Run
 from ftcc.groundside.text import ids
-from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict
+from ftcc.groundside.verdict import AS_IT_SHOULD, FAILED, REMARKS, Verdict, is_diagnosed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,7 +35,10 @@ def show_verdict(console: Console, verdict: Verdict) -> None:
 
 
 def as_json(run: Run, results: list[Result]) -> str:
-    """Return verdict and claims as JSON; ``value`` and ``ok`` are null if the flight did not cover the window."""
+    """Return verdict, claims and diagnosis, if there is one, as JSON.
+
+    ``value`` and ``ok`` of a claim are null if the flight did not cover its window.
+    """
     mission = run.mission
     document = {
         "scenario": mission.name,
@@ -44,6 +47,10 @@ def as_json(run: Run, results: list[Result]) -> str:
         "verdict": run.verdict.as_json(),
         "claims": [result.as_json() for result in results],
     }
+    if is_diagnosed(mission):
+        from ftcc.groundside.report.diagnosis import diagnosis_as_json
+
+        document["diagnosis"] = diagnosis_as_json(run)
     return json.dumps(document, indent=2, allow_nan=False)
 
 
@@ -125,4 +132,8 @@ def show(console: Console, run: Run, results: list[Result]) -> None:
         show_claims(console, results)
     else:
         console.print(f"the scenario makes no claims for case {mission.case}")
+    if is_diagnosed(mission):
+        from ftcc.groundside.report.diagnosis import show_diagnosis
+
+        show_diagnosis(console, run)
     show_verdict(console, run.verdict)

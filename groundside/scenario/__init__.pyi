@@ -8,6 +8,9 @@ from .choosing import ScenarioWarning as ScenarioWarning
 from .choosing import mission_of as mission_of
 from .columns import LEADING as LEADING
 from .faults import TrimDemand as TrimDemand
+from .healthy import HEALTHY as HEALTHY
+from .healthy import healthy_changes as healthy_changes
+from .healthy import healthy_quantities as healthy_quantities
 from .loading import Scenario as Scenario
 from .loading import load as load
 from .loading import load_airframe as load_airframe

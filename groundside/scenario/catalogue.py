@@ -1,7 +1,7 @@
 """Which scenarios there are, and what their files say: finding and reading them, without what checks or flies them.
 
 A scenario is the file ``NAME.toml``. Where ``NAME.variants.toml``, ``NAME.claims.toml`` or ``NAME.study.toml`` stand
-beside it, they are read with it, as if what they hold stood at its end.
+beside it, they are read with it, as if what they hold stood at its end. ``NAME.diagnosis.toml`` holds defaults.
 
 ``ftcc list`` shows what this module tells; it is imported in a few milliseconds, where pydantic and numba would take
 most of a second.
@@ -36,8 +36,13 @@ __all__ = [
 ]
 
 _HERE = Path(__file__).parents[1]
-_COMPANIONS = {"variants": ("variant", "order"), "claims": ("claims", "table"), "study": ("study",)}
-"""What may stand in ``NAME.variants.toml``, ``NAME.claims.toml`` and ``NAME.study.toml``."""
+_COMPANIONS = {
+    "variants": ("variant", "order"),
+    "claims": ("claims", "table"),
+    "study": ("study",),
+    "diagnosis": ("diagnosis",),
+}
+"""What may stand in ``NAME.variants.toml`` and so on."""
 
 
 class ScenarioError(UserError):
@@ -68,6 +73,8 @@ class Contents(NamedTuple):
     claims: tuple[Origin, ...]
     """Of each claim of ``document``."""
     variants: dict[str, Path]
+    calibrated: dict[str, Any]
+    """``[diagnosis]`` of the file that `ftcc calibrate` wrote: values for which ``document`` may have others."""
 
 
 def shipped(kind: str = "scenarios") -> dict[str, Path]:
@@ -76,7 +83,7 @@ def shipped(kind: str = "scenarios") -> dict[str, Path]:
 
 
 def _belongs_to(path: Path) -> Path | None:
-    """The scenario whose variants, claims or study a file of that name holds."""
+    """The scenario whose variants, claims, study or thresholds a file of that name holds."""
     stem, _, kind = path.stem.rpartition(".")
     return path.with_name(f"{stem}.toml") if stem and kind in _COMPANIONS else None
 
@@ -128,6 +135,7 @@ def _contents(texts: tuple[tuple[Path, str], ...]) -> Contents:
     claims: list[Any] = []
     origins: list[Origin] = []
     study: dict[str, Any] = {}
+    calibrated: dict[str, Any] = {}
     for file, content, part in parts:
         _check_keys(path, file, content, part)
         for name, block in _dict(file, content, part, "variant").items():
@@ -153,9 +161,11 @@ def _contents(texts: tuple[tuple[Path, str], ...]) -> Contents:
             if "study" in document:
                 raise _refused(file, content, ("study",), f"study: stands in {path.name} already")
             study = {"study": part["study"]}
+        if "diagnosis" in part and file != path:
+            calibrated = _gains_alone(file, content, part["diagnosis"])
     document = {key: value for key, value in document.items() if key != "table"} | study
     document |= ({"variant": variants} if variants else {}) | ({"claims": claims} if claims else {})
-    return Contents(document, tuple(file for file, _, _ in parts), tuple(origins), variant_files)
+    return Contents(document, tuple(file for file, _, _ in parts), tuple(origins), variant_files, calibrated)
 
 
 def _check_keys(path: Path, file: Path, text: str, part: dict[str, Any]) -> None:
@@ -168,6 +178,13 @@ def _check_keys(path: Path, file: Path, text: str, part: dict[str, Any]) -> None
         there = f"only {' and '.join(allowed)} may stand in this file; the rest belongs into {path.name}"
     if strangers:
         raise _refused(file, text, (strangers[0],), f"{', '.join(strangers)}: {there}")
+
+
+def _gains_alone(file: Path, text: str, table: Any) -> dict[str, Any]:
+    """Refuse thresholds that switch something on."""
+    if not isinstance(table, dict) or [*table] != ["gains"]:
+        raise _refused(file, text, ("diagnosis",), "diagnosis: only [diagnosis.gains] may stand in this file")
+    return table
 
 
 def _dict(file: Path, text: str, part: dict[str, Any], key: str) -> dict[str, Any]:

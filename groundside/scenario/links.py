@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from ftcc.airside.spec import LinkEvent
 from ftcc.groundside.schema import LinkEventFields
@@ -37,32 +37,44 @@ def link_texts(events: Sequence[LinkEventFields]) -> list[tuple[float, int | Non
     return texts
 
 
-def _edges(event: LinkEventFields, graph: Graph, where: str, refuse: Callable[[str], None]) -> list[tuple[int, int]]:
+def _edges(
+    event: LinkEventFields,
+    graph: Graph,
+    pairs: Collection[tuple[int, int]],
+    where: str,
+    refuse: Callable[[str], None],
+) -> list[tuple[int, int]]:
     """Return the directed edges (receiver, sender) that an event changes; [] for a radio that is off."""
     if event.uav is not None:
         if event.uav not in graph.uavs:
             refuse(f"{where}.uav = {event.uav}: there is no such UAV; UAVs are {', '.join(map(str, graph.uavs))}")
-        return [pair for pair in graph.weights if event.uav in pair] if event.kind == "degrade" else []
+        return [pair for pair in pairs if event.uav in pair] if event.kind == "degrade" else []
     assert event.edge is not None
     sender, receiver = event.edge
     asked = [(receiver, sender)] if event.directed else [(receiver, sender), (sender, receiver)]
-    found = [pair for pair in asked if pair in graph.weights]
+    found = [pair for pair in asked if pair in pairs]
     if not found:
         refuse(f"{where}.edge = {list(event.edge)}: there is no such edge in the graph")
     return found
 
 
 def link_changes(
-    events: Sequence[LinkEventFields], graph: Graph, base: Channel, refuse: Callable[[str], None]
+    events: Sequence[LinkEventFields],
+    graph: Graph,
+    more: Iterable[tuple[int, int]],
+    base: Channel,
+    refuse: Callable[[str], None],
 ) -> dict[int, list[LinkEvent]]:
     """Return the changes that each UAV applies to its radio and its in-edges, in order of time.
 
     Events may overlap. The quality of an edge is then the base quality, changed by all events that last at that time,
-    in the order of the file. An edge is blocked while any cut lasts.
+    in the order of the file. An edge is blocked while any cut lasts. ``more`` are edges (receiver, sender) beside those
+    of the graph.
     """
+    pairs = dict.fromkeys((*graph.weights, *more))
     touched: dict[tuple[int, int | None], list[LinkEventFields]] = {}
     for n, event in enumerate(events):
-        edges = _edges(event, graph, f"link_events.{n}", refuse)
+        edges = _edges(event, graph, pairs, f"link_events.{n}", refuse)
         if event.uav is not None and event.kind == "cut":
             touched.setdefault((event.uav, None), []).append(event)
         for receiver, sender in edges:

@@ -2,8 +2,8 @@
 
 A file holds what all flights share, ``[form.NAME]`` and ``[variant.NAME]`` blocks with what they change, and claims;
 variants and claims may stand in files beside it (`catalogue`). A variant may hold ``[variant.NAME.FORM]`` with what it
-changes in that form alone. Merged in the order: file, form, variants as the file lists them, settings of the command
-line. Tables are merged, everything else is replaced.
+changes in that form alone. Merged in the order: calibrated thresholds beside the file, file, form, variants as the file
+lists them, settings of the command line. Tables are merged, everything else is replaced.
 """
 
 from __future__ import annotations
@@ -111,14 +111,15 @@ def load(
     _require_tables(path, document)
     forms, known_variants = forms_and_variants(document)
     chosen, ordered = _choose(path, document, form, variants)
-    layers = [Layer("base", path, (), document)]
+    layers = [*_calibrated(contents), Layer("base", path, (), document)]
     if "flown" not in document:
         layers += _changes(contents, chosen, forms, ordered)
     if changes:
         layers.append(Layer("changes of the study", None, (), dict(changes)))
-    merged = {key: value for key, value in document.items() if key not in ("form", "variant")}
-    for layer in layers[1:]:
+    merged: dict[str, Any] = {}
+    for layer in layers:
         merged = _merged(merged, layer.content)
+    merged = {key: value for key, value in merged.items() if key not in ("form", "variant")}
     merged, options = _with_options(path, merged, settings, seed, duration)
     places = Places(contents, [*layers, *options])
     plan = validate(Plan, merged, path, places)
@@ -236,6 +237,13 @@ def _require_tables(path: Path, document: dict[str, Any]) -> None:
         blocks = document.get(key, {})
         if not isinstance(blocks, dict) or not all(isinstance(block, dict) for block in blocks.values()):
             raise ScenarioError(path, [f"{key} = {shortened(blocks)}: must be tables, [{key}.NAME]"])
+
+
+def _calibrated(contents: Contents) -> Iterator[Layer]:
+    """The thresholds that stand beside the scenario, below all else."""
+    for file in contents.files:
+        if contents.calibrated and file.name.endswith(".diagnosis.toml"):
+            yield Layer("calibrated thresholds", file, (), {"diagnosis": contents.calibrated})
 
 
 def _changes(contents: Contents, form: str, forms: Sequence[str], variants: Sequence[str]) -> Iterator[Layer]:

@@ -15,11 +15,13 @@ from typing import Any, NamedTuple
 
 import tomli_w
 
+from ftcc.airside.autopilots import recorded_signals
+from ftcc.airside.diagnosis.beliefs import belief_signals
 from ftcc.airside.model import Model
 from ftcc.airside.references.position import Fire
 from ftcc.airside.references.profiles import Profile
-from ftcc.airside.scheme import FAULT_TOLERANCE, Flight, Scheme
-from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
+from ftcc.airside.scheme import FAULT_TOLERANCE, Flight, Quantity, Scheme
+from ftcc.airside.spec import AutopilotSpec, DiagnosisSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.scenario.as_flown import as_flown
 from ftcc.groundside.scenario.checks import (
@@ -34,6 +36,7 @@ from ftcc.groundside.scenario.checks import (
     timing_of,
 )
 from ftcc.groundside.scenario.columns import leading_columns
+from ftcc.groundside.scenario.diagnosis import diagnosis_of, health_edges
 from ftcc.groundside.scenario.faults import TrimDemand, check_fault_times, check_faults, trim_demands
 from ftcc.groundside.scenario.fire import check_posts
 from ftcc.groundside.scenario.laws import check_scheme, gains_of, initial_shared_values
@@ -87,6 +90,11 @@ class Mission:
     home: tuple[float, float, float]
     """Latitude, longitude (deg) and altitude (m) of the origin of the local frame."""
     events: tuple[PlannedEvent, ...]
+
+    @property
+    def signals(self) -> tuple[Quantity, ...]:
+        """What each follower's autopilot records."""
+        return recorded_signals(self.autopilots[0])
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -144,13 +152,14 @@ def resolve(scenario: Scenario) -> Mission:
         flight, profiles = _prepare_guidance(plan, basis, vehicles, profiles, references, gains, findings)
     tolerant = _tolerant_gains(scenario, basis.scheme, gains, findings)
     channel = Channel(**plan.channel.model_dump())
-    changes = link_changes(plan.link_events, basis.graph, channel, findings.refuse)
+    changes = link_changes(plan.link_events, basis.graph, health_edges(plan, basis.graph), channel, findings.refuse)
+    diagnosis = diagnosis_of(plan, basis.scheme, basis.plant, vehicles[0], _is_steered(basis), findings)
     check_delays(plan, basis.timing, findings)
-    _check_recorded_columns(plan, basis, findings)
+    _check_recorded_columns(plan, basis, diagnosis, findings)
     findings.stop_if_refused()
 
     autopilots = _autopilots(
-        plan, basis, vehicles, model, flight, gains, tolerant, references, profiles, channel, changes
+        plan, basis, vehicles, model, flight, gains, tolerant, references, profiles, channel, changes, diagnosis
     )
     return Mission(
         name=scenario.name,
@@ -280,13 +289,19 @@ def _tolerant_gains(
     return gains_of(scenario, scheme, findings, switches | {FAULT_TOLERANCE: True})
 
 
-def _check_recorded_columns(plan: Plan, basis: _Basis, findings: Findings) -> None:
+def _check_recorded_columns(plan: Plan, basis: _Basis, diagnosis: DiagnosisSpec, findings: Findings) -> None:
     """Refuse claims and tracking errors that use columns which are not recorded."""
     clearance = ["clearance"] if plan.obstacles else []
-    signals = (quantity.name for quantity in basis.scheme.signals)
+    beliefs = belief_signals(diagnosis.actuators) if diagnosis.on else ()
+    signals = (quantity.name for quantity in (*basis.scheme.signals, *beliefs))
     names = (*leading_columns(basis.plant.ACTUATORS), *clearance, *signals)
     findings.refused += check_claims(plan.claims, basis.graph, names)
     check_tracking(basis.scheme, names, findings)
+
+
+def _is_steered(basis: _Basis) -> bool:
+    """Whether aileron and rudder are moved beside the law: laws for the vertical plane fly north."""
+    return basis.scheme.plant == "longitudinal" and "aileron" in basis.plant.ACTUATORS
 
 
 def _autopilots(
@@ -301,12 +316,13 @@ def _autopilots(
     profiles: dict[int, Profile],
     channel: Channel,
     changes: Mapping[int, Sequence[LinkEvent]],
+    diagnosis: DiagnosisSpec,
 ) -> tuple[AutopilotSpec, ...]:
     """Return the spec of each vehicle's autopilot."""
     graph, scheme = basis.graph, basis.scheme
     initial = initial_shared_values(scheme, vehicles, profiles)
-    # Laws for the vertical plane fly north.
-    steered = scheme.plant == "longitudinal" and "aileron" in basis.plant.ACTUATORS
+    steered = _is_steered(basis)
+    added = health_edges(plan, graph)
     return tuple(
         AutopilotSpec(
             uav=vehicle.uav,
@@ -314,13 +330,15 @@ def _autopilots(
             scheme=scheme.name,
             gains=tuple(gains[vehicle.uav]),
             tolerant_gains=tuple(tolerant[vehicle.uav]) if tolerant[vehicle.uav] != gains[vehicle.uav] else (),
+            diagnosis=diagnosis,
             flight=flight,
             model=model,
             command=vehicle.command,
             travel=vehicle.travel,
             reference=references[vehicle.uav],
-            neighbours=tuple(
-                Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)
+            neighbours=(
+                *(Neighbour(j, graph.weights[vehicle.uav, j], initial.get(j, ())) for j in graph.senders(vehicle.uav)),
+                *(Neighbour(j, 0.0) for receiver, j in added if receiver == vehicle.uav),
             ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
@@ -329,7 +347,7 @@ def _autopilots(
             datum=vehicle.datum,
             course=0.0 if steered and vehicle.uav in graph.followers else None,
             attitude_code=vehicle.attitude_code,
-            receivers=tuple(graph.receivers(vehicle.uav)),
+            receivers=(*graph.receivers(vehicle.uav), *(i for i, sender in added if sender == vehicle.uav)),
         )
         for vehicle in vehicles
     )

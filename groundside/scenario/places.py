@@ -83,6 +83,8 @@ class Places:
                 words.append(f"{_counted(len(claims), 'claim')} of {_counted(len(cases), 'case')}")
             if file.name.endswith(".study.toml"):
                 words.append("a study")
+            if file.name.endswith(".diagnosis.toml"):
+                words.append("calibrated thresholds of diagnosis")
             held[file] = "; ".join(words)
         return held
 

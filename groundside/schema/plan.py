@@ -8,6 +8,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 
 from ftcc.groundside.schema.aircraft import Plant, Starts
 from ftcc.groundside.schema.base import Id, Strict
+from ftcc.groundside.schema.diagnosis import DiagnosisFields
 from ftcc.groundside.schema.fire import FireEventFields, FireFields
 from ftcc.groundside.schema.network import ChannelFields, GraphFields, LinkEventFields
 from ftcc.groundside.schema.references import AttitudeFields, LeaderFields
@@ -125,6 +126,7 @@ class Plan(Strict):
     detection_range: float | None = Field(None, gt=0.0, description="m, range at which leaders detect an obstacle")
     gains: GainFields = GainFields()
     switches: dict[str, bool] = {}
+    diagnosis: DiagnosisFields = DiagnosisFields()
     disturbances: list[DisturbanceFields] = []
     faults: list[FaultFields] = []
     link_events: list[LinkEventFields] = []

@@ -41,7 +41,7 @@ def places_of(mission: Mission) -> dict[str, Place]:
     places |= {f"{name}_command": Place("command", SLOT[name]) for name in actuators}
     places |= {name: Place("acting", SLOT[name]) for name in actuators}
     places |= {name: Place("conditions", n) for n, (name, _) in enumerate(conditions_of(mission.plant))}
-    return places | {quantity.name: Place("signals", n) for n, quantity in enumerate(mission.scheme.signals)}
+    return places | {quantity.name: Place("signals", n) for n, quantity in enumerate(mission.signals)}
 
 
 def places_kept(mission: Mission, columns: Collection[str] | None) -> dict[str, list[int]]:
@@ -56,7 +56,7 @@ def places_kept(mission: Mission, columns: Collection[str] | None) -> dict[str, 
     """
     if columns is None:
         widths = (len(TRUTH), len(ACTUATORS), len(ACTUATORS), len(conditions_of(mission.plant)))
-        return {p: list(range(n)) for p, n in zip(PARTS, (*widths, len(mission.scheme.signals)), strict=True)}
+        return {p: list(range(n)) for p, n in zip(PARTS, (*widths, len(mission.signals)), strict=True)}
     places = places_of(mission)
     wanted = set(columns) - {"t", "uav"}
     if mission.obstacles and _CLEARANCE in wanted:

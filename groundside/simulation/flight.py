@@ -26,7 +26,7 @@ def recorded_columns(mission: Mission) -> tuple[Column, ...]:
     from ftcc.airside.process import columns as autopilot_columns
     from ftcc.sim.process import columns as vehicle_columns
 
-    return (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.scheme.name))
+    return (*vehicle_columns(mission.plant, bool(mission.obstacles)), *autopilot_columns(mission.signals))
 
 
 @dataclass(frozen=True)

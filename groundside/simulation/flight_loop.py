@@ -42,6 +42,7 @@ stages: Any = globals()["stages"]
 cycle: Any = globals()["cycle"]
 
 _control = stages.control
+_diagnose = stages.diagnose
 _hear = stages.hear
 _predict_shared = stages.predict_shared
 _publish = stages.publish
@@ -220,6 +221,7 @@ def _tick_by_wire(world, timing, n):
     for i in range(lost.shape[0]):
         if lost[i] == 0:
             _hear(world.exchange, inbox, world.events, timing, i, now)
+            _diagnose(autopilots, i, now, timing.period_us / 1e6)
             _refer(autopilots, inbox, i, now, timing.period_us)
             _control_follower(world, timing, i, now)
     if now % timing.exchange_us == 0:
@@ -246,6 +248,7 @@ def _ideal_tick(world, timing, n):
         if autopilots.leader[i] == 1:
             # Leaders use each other's records of the previous tick; records of this tick are published later.
             _hear(world.exchange, inbox, world.events, timing, i, now)
+        _diagnose(autopilots, i, now, timing.period_us / 1e6)
         _refer(autopilots, inbox, i, now, timing.period_us)
     for i in range(lost.shape[0]):
         if lost[i] == 0:

@@ -1,6 +1,10 @@
 from .answers import HEADLINE as HEADLINE
 from .answers import Answers as Answers
 from .answers import percent as percent
+from .calibration import Calibrated as Calibrated
+from .calibration import Calibration as Calibration
+from .calibration import calibrate as calibrate
+from .calibration import plan_calibration as plan_calibration
 from .campaign import WITHOUT_END as WITHOUT_END
 from .campaign import Progress as Progress
 from .campaign import fly_study as fly_study

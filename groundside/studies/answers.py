@@ -21,7 +21,7 @@ from ftcc.groundside.statistics import (
     share,
     sobol_indices_of,
 )
-from ftcc.groundside.studies.measures import Measure, measures_of
+from ftcc.groundside.studies.measures import Measure, measures_of, titles_of
 from ftcc.groundside.studies.plan import CASE, StudyPlan
 from ftcc.groundside.verdict import FAILED
 
@@ -89,12 +89,14 @@ class Answers:
         """Return the questions that are answered with yes or no, the headline first."""
         claims = list(dict.fromkeys(measure.title for measure in self.measures))
         judged = [title for title in claims if np.isfinite(self._column(f"{title} holds")).any()]
-        return [HEADLINE, *judged, NOBODY_LOST, NOT_FAILED]
+        own = titles_of(self.plan.claims)
+        in_headline = [title for title in judged if title in own]
+        return [HEADLINE, *in_headline, NOBODY_LOST, NOT_FAILED, *(title for title in judged if title not in own)]
 
     def holds(self, title: str) -> Array:
         """Return 1 where the answer is yes, 0 where no."""
         if title == HEADLINE:
-            judged = [self.holds(one) for one in self.titles[1:-2]]
+            judged = [self.holds(one) for one in self.titles[1 : self.titles.index(NOBODY_LOST)]]
             if not judged:
                 return self.holds(NOT_FAILED)
             whole = np.where(self.refused | ~self._there, np.nan, np.minimum(self.holds(NOBODY_LOST), 1.0))

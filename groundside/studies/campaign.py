@@ -244,7 +244,7 @@ class _Landed:
         wanted = self._until.claim if self._until else None
         if wanted in (None, LOST):
             return None
-        titles = titles_of(self.plan.claims)
+        titles = titles_of(self.plan.asked)
         if wanted not in titles:
             there_are = f"there are {', '.join(titles)}" if titles else "this study has none"
             raise StudyError(f"--until: there is no claim {wanted!r} in this case; {there_are}")
@@ -289,7 +289,7 @@ class _Landed:
         self._refused += outcome.refused
         self._broken += bool(outcome.error) and not outcome.refused
         if not outcome.refused and outcome.number % len(self.plan.combinations) == 0:
-            self._headline[0] += _succeeded(outcome)
+            self._headline[0] += _succeeded(outcome, len(self.plan.claims))
             self._headline[1] += 1
 
     def _answer(self, outcome: Outcome) -> bool | None:
@@ -299,7 +299,7 @@ class _Landed:
             return outcome.holds[self._claim] if outcome.holds else False
         if self._until and self._until.claim == LOST:
             return bool(outcome.lost) or not outcome.flew
-        return _succeeded(outcome)
+        return _succeeded(outcome, len(self.plan.claims))
 
     def _is_enough(self) -> bool:
         """Look at the answer where all flights of a round number of draws have landed, in any order."""
@@ -326,17 +326,17 @@ class _Landed:
         self._report(Progress(flown, self.plan.count, rate, answer, self._refused, self._broken))
 
 
-def _succeeded(outcome: Outcome) -> bool:
-    """Return the headline of one flight, as `Answers` does from the table."""
+def _succeeded(outcome: Outcome, claims: int) -> bool:
+    """Return the headline of one flight with so many claims, as `Answers` does from the table."""
     if not outcome.flew:
         return False
-    judged = [one for one in outcome.holds if one is not None]
+    judged = [one for one in outcome.holds[:claims] if one is not None]
     return not outcome.lost and all(judged) if judged else outcome.verdict != FAILED
 
 
 def _as_outcomes(plan: StudyPlan, table: pa.Table) -> Iterable[Outcome]:
     """Yield what the table says of each flight, as far as it is needed to go on."""
-    titles = titles_of(plan.claims)
+    titles = titles_of(plan.asked)
     columns = ["flight", "lost", "verdict", "refused", "error", *(f"{title} holds" for title in titles)]
     for row in table.select(columns).to_pylist():
         yield Outcome(

@@ -13,8 +13,9 @@ from ftcc.groundside.claims import evaluate, tolerance_of
 from ftcc.groundside.results import Run
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation import Flight, columns_needed, fly_in_memory, simulate
+from ftcc.groundside.studies.diagnosed import diagnosed
 from ftcc.groundside.studies.plan import StudyPlan
-from ftcc.groundside.verdict import Verdict
+from ftcc.groundside.verdict import Verdict, columns_diagnosed
 
 __all__ = ["Outcome", "fly_trial", "mission_of_row", "run_folder"]
 
@@ -28,9 +29,9 @@ class Outcome:
     drawn: tuple[Any, ...] = ()
     """Value of each random quantity."""
     values: tuple[float | list[float] | None, ...] = ()
-    """Value of each claim; empty if it did not fly."""
+    """Value of each claim and of what diagnosis is asked; empty if it did not fly."""
     holds: tuple[bool | None, ...] = ()
-    """Whether each claim holds; None if that cannot be said. Empty if it did not fly."""
+    """Whether each of them holds; None if that cannot be said. Empty if it did not fly."""
     lost: tuple[int, ...] = ()
     """Lost UAVs."""
     verdict: str | None = None
@@ -117,18 +118,19 @@ def _flown(
 ) -> Outcome:
     asked = replace(mission, claims=plan.claims)
     flight: Flight | Run = (
-        fly_in_memory(mission, progress, columns=columns_needed(asked))
+        fly_in_memory(mission, progress, columns=columns_needed(asked) | columns_diagnosed(mission))
         if record_in is None
         else simulate(mission, run_folder(record_in, number), progress)
     )
     results = evaluate(flight, plan.claims, plan.case, mission.graph)
     own = plan.is_own_case(mission)
+    numbers, found = diagnosed(flight) if len(plan.asked) > len(plan.claims) else ((), ())
     verdict = flight.verdict
     lost = [f"UAV {uav} lost at {t:g} s: {why}" for uav, (t, why) in flight.lost.items()]
     return Outcome(
         number,
-        values=tuple(result.value for result in results),
-        holds=tuple(_holds(result, own) for result in results),
+        values=(*(result.value for result in results), *numbers),
+        holds=(*(_holds(result, own) for result in results), *found),
         lost=tuple(sorted(flight.lost)),
         verdict=verdict.word,
         largest=verdict.tracking[0].largest if verdict.tracking else None,

@@ -60,9 +60,9 @@ class Measure:
 
 
 def measures_of(plan: StudyPlan) -> list[Measure]:
-    """Return the numbers that the claims of a study measure, in their order."""
+    """Return the numbers that a study asks for, in the order of ``plan.asked``."""
     found: list[Measure] = []
-    for place, (claim, title) in enumerate(zip(plan.claims, titles_of(plan.claims), strict=True)):
+    for place, (claim, title) in enumerate(zip(plan.asked, titles_of(plan.asked), strict=True)):
         expected = claim.expected[plan.case]
         tolerance = tolerance_of(str(claim.tolerance))
         if isinstance(expected, list):

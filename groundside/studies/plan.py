@@ -11,6 +11,7 @@ from typing import Any
 
 from ftcc.groundside.scenario import Mission, Scenario, ScenarioError, resolve, scenario_of, with_value
 from ftcc.groundside.schema import Claim
+from ftcc.groundside.studies.diagnosed import asked_of_diagnosis
 from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.quantities import Draws
 
@@ -79,6 +80,15 @@ class StudyPlan:
     def combinations(self) -> tuple[tuple[Any, ...], ...]:
         """Return the values of `variations` in each combination."""
         return tuple(itertools.product(*(variation.values for variation in self.variations)))
+
+    @functools.cached_property
+    def asked(self) -> tuple[Claim, ...]:
+        """Return `claims`, then what diagnosis on board is asked if some flights have it."""
+        on = any(document.get("diagnosis", {}).get("on") for _, document in self.documents)
+        keys = [*(one.key for one in self.varied), *(one.key for one in self.draws.quantities)]
+        if not on and "diagnosis.on" not in keys:
+            return self.claims
+        return (*self.claims, *asked_of_diagnosis(self.case, self.mission.timing.duration))
 
     @property
     def case(self) -> str:

@@ -24,7 +24,7 @@ from ftcc.groundside.studies.errors import StudyError
 from ftcc.groundside.studies.plan import CASE, StudyPlan, Variation
 from ftcc.groundside.studies.quantities import Draws, RandomQuantity, quantities_in, quantity_of
 
-__all__ = ["plan_study"]
+__all__ = ["plan_of_fields", "plan_study"]
 
 _EDGES = (0.001, 0.999)
 """Quantiles of each random quantity that are checked before anything starts."""
@@ -98,8 +98,49 @@ def plan_study(
                 "question": "",
             }
         )
-    quantities = _quantities(random, fields)
-    variations = _variations(vary, fields)
+    return plan_of_fields(
+        scenario,
+        fields,
+        variations=_variations(vary, fields),
+        quantities=_quantities(random, fields),
+        samples=samples or seeds,
+        design=design,
+        redraw=redraw,
+        against=against,
+        sensitivity=sensitivity,
+        form=form,
+        variants=variants,
+        settings=settings,
+        seed=seed,
+        duration=duration,
+    )
+
+
+def plan_of_fields(
+    scenario: str | Path,
+    fields: StudyFields,
+    *,
+    variations: tuple[Variation, ...] | None = None,
+    quantities: tuple[RandomQuantity, ...] | None = None,
+    samples: int | None = None,
+    design: str | None = None,
+    redraw: bool | None = None,
+    against: Sequence[str] = (),
+    sensitivity: bool = False,
+    form: str | None = None,
+    variants: str | Sequence[str] = (),
+    settings: Sequence[str] = (),
+    seed: int | None = None,
+    duration: float | None = None,
+) -> StudyPlan:
+    """Plan the study of a scenario that ``fields`` describe; what else is given stands above them, see `plan_study`.
+
+    Raises
+    ------
+    StudyError, ScenarioError
+    """
+    quantities = _quantities((), fields) if quantities is None else quantities
+    variations = _variations((), fields) if variations is None else variations
     _refuse_doubles(variations, quantities)
     first, documents = _cases(
         scenario,
@@ -114,7 +155,7 @@ def plan_study(
     draws = Draws(
         quantities,
         design or fields.design,
-        samples or seeds or fields.samples or 1,
+        samples or fields.samples or 1,
         first.plan.seed,
         sensitivity,
     )

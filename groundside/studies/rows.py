@@ -95,7 +95,7 @@ def _row(plan: StudyPlan, outcome: Outcome) -> tuple[Any, ...]:
     row: list[Any] = [outcome.number, *plan.combinations[trial.combination], trial.draw]
     row += outcome.drawn or (None,) * len(plan.draws.quantities)
     row.append(trial.seed)
-    titles = titles_of(plan.claims)
+    titles = titles_of(plan.asked)
     for title, group in itertools.groupby(measures_of(plan), key=lambda one: one.title):
         row += [measure.of(outcome.values) for measure in group]
         row.append(outcome.holds[titles.index(title)] if outcome.holds else None)

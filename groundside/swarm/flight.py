@@ -180,7 +180,7 @@ def _end_processes(flight: FlightInProgress) -> None:
 
 def _station(mission: Mission, options: FlightOptions, ports: PortBlock, run_started: float) -> Monitor:
     """Return the monitor that receives all telemetry and logs it."""
-    signals = [signal_.name for signal_ in mission.scheme.signals]
+    signals = [signal_.name for signal_ in mission.signals]
     uavs = [spec.uav for spec in mission.vehicles]
     sources = [port for uav in uavs for port in (ports.of(uav).telemetry, ports.of(uav).truth)]
     tlog = options.folder / "telemetry.tlog"

@@ -21,6 +21,7 @@ os.environ["JE_ARROW_MALLOC_CONF"] = "background_thread:false"
 import numpy as np
 
 from ftcc.airside import process as autopilot_process
+from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.compiled_stages import flight_of as flight_of_autopilots
 from ftcc.airside.compiled_stages import placeholder as no_autopilot
 from ftcc.airside.group import build_group as build_autopilots
@@ -39,8 +40,10 @@ __all__ = ["load"]
 def load(scheme: str, plant: str) -> None:
     """Load or compile everything that a swarm of ``scheme`` on ``plant`` executes."""
     timing = Timing(1, 1, 1, 1, 1, 1, 1)
-    rows, link_rows = (new_rows(1, len(columns)) for columns in (autopilot_process.columns(scheme), LINK_COLUMNS))
-    autopilots = build_autopilots([no_autopilot(scheme)], timing, rows, link_rows)
+    spec = no_autopilot(scheme)
+    columns = autopilot_process.columns(recorded_signals(spec))
+    rows, link_rows = (new_rows(1, len(recorded)) for recorded in (columns, LINK_COLUMNS))
+    autopilots = build_autopilots([spec], timing, rows, link_rows)
     autopilot_process.load_compiled(autopilots, timing, flight_of_autopilots(scheme))
     # Python calls these when it sends and receives; loaded in each child, they would cost 5 MB.
     begin(autopilots.transmission, 0, 0, 0, 1)

@@ -275,7 +275,7 @@ class Swarm(Commanding):
         from ftcc.sim.process import columns as vehicle_columns
 
         mission = self.mission
-        roles = {column.name: "autopilot" for column in autopilot_columns(mission.scheme.name)}
+        roles = {column.name: "autopilot" for column in autopilot_columns(mission.signals)}
         return roles | {column.name: "vehicle" for column in vehicle_columns(mission.plant, bool(mission.obstacles))}
 
     def _recorded_by(self, uav: int) -> list[str]:

@@ -1,3 +1,11 @@
+from .diagnosis import AFTER as AFTER
+from .diagnosis import SIGMAS as SIGMAS
+from .diagnosis import Alarm as Alarm
+from .diagnosis import FaultFound as FaultFound
+from .diagnosis import columns_diagnosed as columns_diagnosed
+from .diagnosis import false_alarms as false_alarms
+from .diagnosis import faults_found as faults_found
+from .diagnosis import is_diagnosed as is_diagnosed
 from .judging import columns_judged as columns_judged
 from .judging import judge as judge
 from .verdict import AS_IT_SHOULD as AS_IT_SHOULD

@@ -81,7 +81,7 @@ def columns_judged(mission: Mission) -> frozenset[str]:
     scheme, plant = mission.scheme, mission.plant
     expressions = [error.name for error in scheme.tracking]
     expressions += [error.bound for error in scheme.tracking if isinstance(error.bound, str)]
-    for signal in scheme.signals:
+    for signal in mission.signals:
         if signal.bound is not None:
             expressions += [signal.name, str(signal.bound)]
     if len(mission.graph.leaders) > 1:
@@ -180,7 +180,7 @@ def _allowed(flight: _Flight, bound: float | str | None, unit: str, uav: int) ->
 
 def _outside(flight: _Flight) -> Iterator[Outside]:
     """Yield the bounds of signals, and the leaders' hull, that a UAV left."""
-    for signal in flight.mission.scheme.signals:
+    for signal in flight.mission.signals:
         for uav in flight.followers if signal.bound is not None else ():
             bound = np.abs(flight.values(str(signal.bound), uav))
             beyond = np.abs(flight.values(signal.name, uav)) > bound
@@ -270,7 +270,7 @@ def _oscillating(flight: _Flight) -> Iterator[tuple[int, str, str, str, float]]:
 
 def _causes(mission: Mission) -> list[str]:
     """Return the columns of followers whose oscillations cause others."""
-    own = [signal.name for signal in mission.scheme.signals if signal.shown_as == "reference"]
+    own = [signal.name for signal in mission.signals if signal.shown_as == "reference"]
     return own + [name for name, _ in conditions_of(mission.plant)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,13 @@ from tests.bench.swarms import swarm_file
 from tests.sitl.conftest import Flight, events, same_flight
 
 DURATION = "30"
+
+
+def changes_of_belief(folder: Path) -> list[tuple[object, object, object, str]]:
+    """Time, UAV, severity and text of the events in which a UAV tells what it believes of an actuator."""
+    words = re.compile("something is wrong|faulty|fault has changed|healthy again")
+    listed = [(event["t"], event["uav"], event["severity"], str(event["text"])) for event in events(folder)]
+    return [event for event in listed if words.search(event[3])]
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +135,31 @@ def test_a_swarm_in_which_one_hears_nobody_and_one_is_heard_by_nobody_flies(
     """A leader waits for the acknowledgement of a follower that has nobody to tell anything."""
     flight = fly(str(swarm_file(tmp_path, 2, duration=20.0)), "--speed", "max")
     assert flight.wait() == 0, flight.output
+
+
+def test_a_swarm_that_makes_room_equals_the_simulation(fly: Callable[..., Flight], tmp_path: Path) -> None:
+    """UAV 1 leaves: health travels over edges that only leaders use, through a lossy channel, between processes."""
+    from ftcc.groundside.scenario.loading import load
+    from ftcc.groundside.scenario.mission import resolve
+    from ftcc.groundside.simulation import simulate
+
+    settings = [
+        "diagnosis.on=true",
+        "diagnosis.cooperate=true",
+        "diagnosis.gains.drift_elevator=0.03",
+        "diagnosis.gains.limit_elevator=0.006",
+        "disturbances=[]",
+        "faults=[{at=16.0,uav=1,actuator='elevator',effectiveness=0.4,bias=0.15,without_trim=true}]",
+    ]
+    mission = resolve(load("containment", variants=("loss30",), settings=settings, duration=30.0))
+    simulate(mission, tmp_path / "simulated")
+    said = [event["text"] for event in events(tmp_path / "simulated")]
+    assert "leaves the swarm: it cannot keep up" in said
+    given = [part for setting in settings for part in ("--set", setting)]
+    flight = fly("containment", "--variant", "loss30", "--duration", "30", "--speed", "max", *given)
+    assert flight.wait(240) == 0, flight.output
+    assert same_flight(flight.folder, tmp_path / "simulated")
+    ours, theirs = (changes_of_belief(folder) for folder in (flight.folder, tmp_path / "simulated"))
+    assert ours == theirs
+    assert [uav for _, uav, _, text in ours if "something is wrong" in text] == [1]
+    assert "elevator faulty" in ours[1][3]

@@ -55,6 +55,7 @@ NOT_RUN = {
     "pip install": "installs; the tests put the example on the path themselves",
     "pytest": "is these tests",
     "ftcc doctor": "flies for a quarter of a minute: tests/groundside/swarm/test_doctor.py",
+    "ftcc calibrate": "writes beside a shipped scenario: tests/groundside/studies/test_calibration.py",
     "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",

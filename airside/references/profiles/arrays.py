@@ -17,10 +17,12 @@ __all__ = [
     "ALTITUDE",
     "CLAMPED",
     "CLIMB",
+    "CLIMB_LIMIT",
     "FIRED",
     "FROM_GROUND",
     "PROFILE_PARAMETERS",
     "PROFILE_STATES",
+    "SINK_LIMIT",
     "SPEED",
     "SPEED_RATE",
     "TRIGGER_COLUMNS",
@@ -65,6 +67,9 @@ class ProfileParameters(NamedTuple):
 
 
 PROFILE_PARAMETERS = width(ProfileParameters)
+CLIMB_LIMIT, SINK_LIMIT = PROFILE_PARAMETERS - 2, PROFILE_PARAMETERS - 1
+"""Columns of the parameters."""
+assert ProfileParameters._fields[-2:] == ("climb_limit", "sink_limit")
 
 X, ALTITUDE, CLIMB, SPEED, SPEED_RATE = range(5)
 """Columns of the state: forward position, m; altitude, m, and speed, m/s, each with its rate."""

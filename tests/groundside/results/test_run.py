@@ -33,7 +33,7 @@ def write_parts(run: Run, folder: Path, keep: Callable[[int, str], int | None] =
     shutil.copy(run.path / "scenario.toml", folder)
     leaders = run.mission.graph.leaders
     for uav in run.uavs:
-        both = {"vehicle": vehicle_columns("longitudinal"), "autopilot": autopilot_columns("containment")}
+        both = {"vehicle": vehicle_columns("longitudinal"), "autopilot": autopilot_columns(run.mission.signals)}
         for role, columns in both.items():
             if role == "autopilot" and uav in leaders:
                 continue

@@ -115,7 +115,7 @@ def test_shipped_scenarios_are_what_flies(name: str) -> None:
     assert text.count("\n") <= 120
     assert "[[claims]]" not in text
     cases = cases_of(load(name))
-    assert len(cases) > 1 or name == "demo"
+    assert len(cases) > 1 or name in ("demo", "active")
 
 
 # --- what is refused -------------------------------------------------------------------------------------------------
@@ -237,6 +237,33 @@ def test_the_line_of_every_claim_is_known(name: str) -> None:
         assert place.file is not None
         line = place.file.read_text().splitlines()[place.line - 1]
         assert f'"{claim.name}"' in line or line == "[[table.columns]]", (claim.name, line)
+
+
+def test_calibrated_thresholds_are_below_all_else(mine: Path) -> None:
+    beside(mine, diagnosis="[diagnosis.gains]\nlimit_elevator = 0.5\nlimit_thrust = 6.0\n")
+    given = {"diagnosis": {"gains": {"limit_thrust": 7.0}}}
+    assert load(mine).plan.diagnosis.gains.given == {"limit_elevator": 0.5, "limit_thrust": 6.0}
+    assert load(mine, changes=given).plan.diagnosis.gains.given == {"limit_elevator": 0.5, "limit_thrust": 7.0}
+    scenario = load(mine, settings=["diagnosis.gains.limit_elevator=0.1", "diagnosis.on=true"])
+    assert scenario.plan.diagnosis.gains.given == {"limit_elevator": 0.1, "limit_thrust": 6.0}
+    assert scenario.places is not None
+    (place,) = scenario.places.of("diagnosis.gains.limit_thrust").values()
+    assert (place.layer, place.line) == ("calibrated thresholds", 3)
+    assert "mine.diagnosis.toml" not in [*shipped()]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("[diagnosis]\non = true\n", ":1: diagnosis: only [diagnosis.gains] may stand in this file"),
+        ("duration = 3.0\n", ":1: duration: only diagnosis may stand in this file; the rest belongs into mine.toml"),
+        ("[diagnosis.gains]\nlimit_rudder = -1.0\n", ":1: diagnosis.gains: gain limit_rudder = -1: must be"),
+        ("[diagnosis.gains]\nlimit = 1.0\n", "diagnosis has no gain limit"),
+    ],
+)
+def test_wrong_thresholds_are_refused_with_their_line(mine: Path, text: str, problem: str) -> None:
+    beside(mine, diagnosis=text)
+    assert problem in refusal(mine, settings=["diagnosis.on=true"])
 
 
 def test_lines_are_counted_through_lists_quotes_and_comments() -> None:
