@@ -25,7 +25,7 @@ from ftcc.airside.references.profiles import (
 )
 from ftcc.airside.scheme import Quantity, Scheme
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec
+from ftcc.airside.spec import AutopilotSpec, is_active
 from ftcc.link.actuators import SLOT
 from ftcc.link.channel import Channel, Inbox, new_inbox
 from ftcc.link.compiled import width
@@ -96,8 +96,10 @@ class Autopilots(NamedTuple):
     """(k,): flight mode, see `link.flight_modes`."""
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
-    diagnosis: Diagnosis
-    cooperation: Cooperation
+    diagnosis: Diagnosis | None
+    """None without active fault tolerance."""
+    cooperation: Cooperation | None
+    """As above."""
     events: EventList
     """What leaders, and UAVs that leave or change a belief, have to report, see `leader.drain_leader_events`."""
 
@@ -172,9 +174,8 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
     """Arrays for ``specs``, which share one scheme, before the first tick."""
     scheme: Scheme = find(specs[0].scheme)
     k = len(specs)
-    diagnosis = new_diagnosis(specs, len(scheme.signals), scheme.shared_width)
-    diagnosed = any(spec.diagnosis.on for spec in specs)
-    shared_width = scheme.shared_width + (len(HEALTH_SHARED) if diagnosed else 0)
+    active = is_active(specs)
+    shared_width = scheme.shared_width + (len(HEALTH_SHARED) if active else 0)
     inbox, weight = _inbox_of(specs, shared_width)
     profiles = _profiles_of(specs, timing)
     leader = np.array([spec.role == "leader" for spec in specs], np.int64)
@@ -209,8 +210,8 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
         mode=np.full(k, MISSION),
         held_us=np.zeros(k, np.int64),
-        diagnosis=diagnosis,
-        cooperation=new_cooperation(specs, scheme, weight, profiles.parameters, shared_width),
+        diagnosis=new_diagnosis(specs, len(scheme.signals), scheme.shared_width) if active else None,
+        cooperation=new_cooperation(specs, scheme, weight, profiles.parameters, shared_width) if active else None,
         events=new_events(),
     )
     return autopilots, inbox

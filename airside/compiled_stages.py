@@ -7,10 +7,13 @@ import sys
 from types import ModuleType
 
 from ftcc.airside.autopilots import build
+from ftcc.airside.diagnosis import active as active_tolerance
+from ftcc.airside.diagnosis import passive as passive_tolerance
+from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec, OwnReference
+from ftcc.airside.spec import AutopilotSpec, DiagnosisSpec, OwnReference
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel
 from ftcc.link.compiled import instantiate, refusal, uncompile
@@ -20,14 +23,20 @@ __all__ = ["flight_of", "placeholder", "stages_of"]
 
 
 @functools.cache
-def stages_of(name: str) -> ModuleType:
-    """The stages of a tick under a scheme, by its name, see `stages`.
+def stages_of(name: str, active: bool = False) -> ModuleType:
+    """The stages of a tick under a scheme, by its name, with active fault tolerance or without, see `stages`.
 
     They are compiled, or, where numba cannot compile the scheme, plain Python: then their ``REFUSAL`` says why.
     """
     scheme = find(name)
-    stages = instantiate("ftcc.airside.stages", name, scheme=scheme.module, references=of_plant(scheme.plant))
-    autopilots, inbox = build([placeholder(name)], Timing(1, 1, 1, 1, 1, 1, 1))
+    stages = instantiate(
+        "ftcc.airside.stages",
+        _instance(name, active),
+        scheme=scheme.module,
+        references=of_plant(scheme.plant),
+        tolerance=active_tolerance if active else passive_tolerance,
+    )
+    autopilots, inbox = build([placeholder(name, active)], Timing(1, 1, 1, 1, 1, 1, 1))
     because = refusal(stages.control, autopilots, inbox, 0, 0.01)
     if because:
         stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, slowly: numba cannot compile it ({because})"
@@ -36,13 +45,17 @@ def stages_of(name: str) -> ModuleType:
 
 
 @functools.cache
-def flight_of(name: str) -> ModuleType:
+def flight_of(name: str, active: bool = False) -> ModuleType:
     """The flight of autopilots under a scheme, by its name, see `flight`: compiled or not, as its stages are."""
-    stages = stages_of(name)
-    flight = instantiate("ftcc.airside.flight", name, stages=stages)
+    stages = stages_of(name, active)
+    flight = instantiate("ftcc.airside.flight", _instance(name, active), stages=stages)
     if stages.REFUSAL:
         uncompile([flight])
     return flight
+
+
+def _instance(name: str, active: bool) -> str:
+    return f"{name},active" if active else name
 
 
 def _with_its_package(scheme: ModuleType) -> list[ModuleType]:
@@ -53,7 +66,7 @@ def _with_its_package(scheme: ModuleType) -> list[ModuleType]:
     return [module for name, module in sys.modules.items() if name == package or name.startswith(f"{package}.")]
 
 
-def placeholder(name: str) -> AutopilotSpec:
+def placeholder(name: str, active: bool = False) -> AutopilotSpec:
     """A follower that knows and hears nothing, to compile with."""
     scheme = find(name)
     return AutopilotSpec(
@@ -67,4 +80,5 @@ def placeholder(name: str) -> AutopilotSpec:
         reference=OwnReference((0.0,) * len(of_plant(scheme.plant).Reference._fields)),
         neighbours=(),
         channel=Channel(),
+        diagnosis=DiagnosisSpec(on=active, gains=(0.0,) * len(DiagnosisGains._fields)),
     )

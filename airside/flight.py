@@ -130,11 +130,18 @@ def hear(group, timing, i, now_us):
     _hear(group.exchange, group.inbox, group.link_events, timing, i, now_us)
 
 
-@compiled_within
-def diagnose(group, timing, i, now_us):
-    """What the UAV finds out about its own actuators; nothing where diagnosis is off."""
-    if group.autopilots.diagnosis.on[i] == 1:
+if stages.ACTIVE:
+
+    @compiled_within
+    def diagnose(group, timing, i, now_us):
+        """What the UAV finds out about its own actuators."""
         _diagnose(group.autopilots, i, now_us, timing.period_us / 1e6)
+
+else:
+
+    @compiled_within
+    def diagnose(group, timing, i, now_us):
+        pass
 
 
 @compiled_within

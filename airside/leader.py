@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.diagnosis.beliefs import Belief
-from ftcc.airside.diagnosis.cooperation import BACK, LEFT, NO_ROOM, ROOM, makes_room, room_text
+from ftcc.airside.diagnosis.cooperation import BACK, LEFT, NO_ROOM, ROOM, room_text
 from ftcc.airside.diagnosis.events import BELIEVES, belief_text
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.airside.references.profiles import CLAMPED, FIRED, armed, refer, stand
@@ -42,8 +42,10 @@ def _position_of(autopilots, inbox, i, edge):
 
 
 @compiled
-def advance_leader(autopilots, inbox, i, now_us, period_us):
+def advance_leader(autopilots, inbox, i, now_us, period_us, makes_room):
     """Advance the profile of UAV ``i`` to this tick, set its target and what it shares.
+
+    That its climb rate is held at its limit is no event while it ``makes_room`` for a follower.
 
     To be called after `hear`: a profile may wait for the position of another leader.
     """
@@ -61,7 +63,7 @@ def advance_leader(autopilots, inbox, i, now_us, period_us):
         refer(autopilots.profile[i], commands, triggers, state, reference, watched, clock, period_us)
         if state[FIRED] > fired:
             note(autopilots.events, now_us, i, _PASSED, int(fired))
-        if state[CLAMPED] > clamped and not makes_room(autopilots, i):
+        if state[CLAMPED] > clamped and not makes_room:
             note(autopilots.events, now_us, i, _HELD, int(reference[_Z_DOT] > 0.0))
     at = fields(Reference, reference)
     offset = autopilots.offset[i]
@@ -79,7 +81,7 @@ def drain_leader_events(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) 
     """
     events = []
     for row, (at_us, i, kind, number) in enumerate(drain_events(autopilots.events)):
-        if kind == BELIEVES:
+        if kind == BELIEVES and autopilots.diagnosis is not None:
             actuator = in_slots(specs[i].diagnosis.actuators)[number]
             before, *belief = autopilots.diagnosis.details[row].tolist()
             events.append((at_us, specs[i].uav, *belief_text(actuator, before, Belief(*belief))))

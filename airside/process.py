@@ -21,7 +21,7 @@ from ftcc.airside.leader import drain_leader_events
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.scheme import Quantity
 from ftcc.airside.schemes import find
-from ftcc.airside.spec import AutopilotSpec
+from ftcc.airside.spec import AutopilotSpec, is_active
 from ftcc.link.compiled import entry_of
 from ftcc.link.gate import Ended, EventReport, Gate, Ready
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint, ending_message, ends
@@ -48,7 +48,7 @@ def columns(signals: Iterable[Quantity]) -> tuple[Column, ...]:
 def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
     """Fly the autopilots of this process from the launcher's go to its release."""
     process = AutopilotProcess(specs, setting, gate)
-    refusal = stages_of(specs[0].scheme).REFUSAL
+    refusal = stages_of(specs[0].scheme, is_active(specs)).REFUSAL
     try:
         if refusal and specs[0].uav == min(setting.ports):
             # One process reports it for all.
@@ -78,7 +78,7 @@ class AutopilotProcess:
         self.setting = setting
         self.timing = setting.timing
         self.gate = gate
-        self.flight = flight_of(specs[0].scheme)
+        self.flight = flight_of(specs[0].scheme, is_active(specs))
         self.recorder = Recorder(
             [part_path(setting.folder, s.uav, "autopilot") if s.role == "follower" else None for s in specs],
             columns(recorded_signals(specs[0])),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ftcc.airside.model import Model
@@ -11,7 +12,7 @@ from ftcc.link.actuators import ACTUATORS
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
 
-__all__ = ["AutopilotSpec", "DiagnosisSpec", "LinkEvent", "Neighbour", "OwnReference"]
+__all__ = ["AutopilotSpec", "DiagnosisSpec", "LinkEvent", "Neighbour", "OwnReference", "is_active"]
 
 
 @dataclass(frozen=True)
@@ -113,3 +114,8 @@ class AutopilotSpec:
             If it is no in-neighbour of this UAV.
         """
         return [neighbour.uav for neighbour in self.neighbours].index(sender)
+
+
+def is_active(specs: Sequence[AutopilotSpec]) -> bool:
+    """Whether any of the autopilots of a swarm has active fault tolerance: it diagnoses its actuators."""
+    return any(spec.diagnosis.on for spec in specs)

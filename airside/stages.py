@@ -2,8 +2,9 @@
 
 A template, see `instantiate`.
 
-The free name ``scheme`` is the module of the control law, ``references`` that of its UAVs' own references.
-`compiled_stages.stages_of` gives this module with both filled in. The functions work on the arrays of `Autopilots`:
+The free name ``scheme`` is the module of the control law, ``references`` that of its UAVs' own references, and
+``tolerance`` is `diagnosis.active` or `diagnosis.passive`. `compiled_stages.stages_of` gives this module with all three
+filled in. The functions work on the arrays of `Autopilots`:
 `flight` calls them in their order in the autopilot process, ``flight_loop`` in the simulation in one process.
 """
 
@@ -11,11 +12,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ftcc.airside.diagnosis.accommodation import accommodate, command_for, is_accommodated
-from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, is_apart, refer_apart
-from ftcc.airside.diagnosis.events import note_beliefs
-from ftcc.airside.diagnosis.health import share_health
-from ftcc.airside.diagnosis.stage import diagnose as _diagnose
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.leader import advance_leader
@@ -23,12 +19,23 @@ from ftcc.airside.model import Model
 from ftcc.airside.scheme import Heard
 from ftcc.link.actuators import decode_command
 from ftcc.link.channel import hear as hear_inbox
-from ftcc.link.compiled import compiled, copy, fields, store, width
+from ftcc.link.compiled import compiled, compiled_within, copy, fields, store, width
 from ftcc.link.exchange import deliver_due, post
 from ftcc.link.flight_modes import HOLD
 from ftcc.link.messages import StateMessage
 
-__all__ = ["SWEEPS", "control", "diagnose", "hear", "predict_shared", "publish", "refer", "sense", "set_shared"]
+__all__ = [
+    "ACTIVE",
+    "SWEEPS",
+    "control",
+    "diagnose",
+    "hear",
+    "predict_shared",
+    "publish",
+    "refer",
+    "sense",
+    "set_shared",
+]
 
 # A template has no such names until `instantiate` gives them.
 if "scheme" not in globals():
@@ -36,6 +43,7 @@ if "scheme" not in globals():
 
 scheme: Any = globals()["scheme"]
 references: Any = globals()["references"]
+tolerance: Any = globals()["tolerance"]
 
 _State = scheme.State
 _Output = scheme.Output
@@ -48,6 +56,18 @@ _refer = references.refer
 _STATES = width(_State)
 _stand = references.stand
 _COMMANDS = len(scheme.COMMANDS)
+_command_for = tolerance.command_for
+_diagnose = tolerance.diagnose
+_heard_by_law = tolerance.heard_by_law
+_is_apart = tolerance.is_apart
+_look_after = tolerance.look_after
+_makes_room = tolerance.makes_room
+_refer_apart = tolerance.refer_apart
+_share_health = tolerance.share_health
+_given_to_law = tolerance.given_to_law
+
+ACTIVE: bool = tolerance.ACTIVE
+"""Whether the UAVs diagnose their actuators."""
 
 REFUSAL = ""
 """Why numba cannot compile the scheme, set by `compiled_stages.stages_of`; empty where it can."""
@@ -61,16 +81,14 @@ _LARGEST = 1e30
 """Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
 
 
-@compiled
+@compiled_within
 def _heard_by(autopilots, inbox, i):
-    if hears_virtual_leader(autopilots, i):
-        c = autopilots.cooperation
-        return Heard(c.records[i], c.edges[i, 0], c.edges[i, 1], c.edges[i, 2])
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
-    return Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
+    heard = Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
+    return _heard_by_law(autopilots, i, heard)
 
 
-@compiled
+@compiled_within
 def _start_law(autopilots, inbox, i, own, reference, gains):
     if autopilots.started[i] == 0:
         model = fields(Model, autopilots.model[i])
@@ -81,13 +99,13 @@ def _start_law(autopilots, inbox, i, own, reference, gains):
 if hasattr(scheme, "observe"):
     _observe = scheme.observe
 
-    @compiled
+    @compiled_within
     def _set_signals(autopilots, i, before, own, reference, output, gains):
         store(_observe(before, own, reference, output, gains), autopilots.signals[i])
 
 else:
 
-    @compiled
+    @compiled_within
     def _set_signals(autopilots, i, before, own, reference, output, gains):
         store(before, autopilots.signals[i])
         copy(autopilots.output[i, _COMMANDS:], autopilots.signals[i, _STATES:])
@@ -112,13 +130,10 @@ def hear(exchange, inbox, events, timing, i, now_us):
     hear_inbox(inbox, i, now_us)
 
 
-@compiled
+@compiled_within
 def diagnose(autopilots, i, now_us, dt):
     """What UAV ``i`` finds out about its own actuators, and what its law is told of it; nothing where it is off."""
-    if autopilots.diagnosis.on[i] == 1:
-        _diagnose(autopilots, i, now_us, dt)
-        note_beliefs(autopilots, i, now_us)
-        accommodate(autopilots, i, dt)
+    _diagnose(autopilots, i, now_us, dt)
 
 
 @compiled
@@ -128,17 +143,16 @@ def refer(autopilots, inbox, i, now_us, period_us):
     To be called once at every tick, after `hear`: a profile may wait for the position of another leader. In hold
     it stands still.
     """
-    if autopilots.diagnosis.cooperates[i] == 1:
-        cooperate(autopilots, inbox, i, now_us, period_us / 1e6)
+    _look_after(autopilots, inbox, i, now_us, period_us / 1e6)
     if autopilots.leader[i] == 1:
-        advance_leader(autopilots, inbox, i, now_us, period_us)
+        advance_leader(autopilots, inbox, i, now_us, period_us, _makes_room(autopilots, i))
         return
     if autopilots.mode[i] == HOLD:
         if _stand(autopilots.reference[i], period_us):
             autopilots.held_us[i] += period_us
         return
-    if is_apart(autopilots, i):
-        refer_apart(autopilots, inbox, i, now_us, period_us)
+    if _is_apart(autopilots, i):
+        _refer_apart(autopilots, inbox, i, now_us, period_us)
         return
     parameters, commands = autopilots.reference_parameters[i], autopilots.reference_commands[i]
     _refer(parameters, commands, autopilots.reference[i], now_us - autopilots.held_us[i], period_us)
@@ -176,10 +190,7 @@ def control(autopilots, inbox, i, dt):
     """
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
-    if is_accommodated(autopilots, i):
-        own, model = fields(Own, autopilots.diagnosis.own[i]), fields(Model, autopilots.diagnosis.model[i])
-    else:
-        own, model = fields(Own, autopilots.own[i]), fields(Model, autopilots.model[i])
+    own, model = _given_to_law(autopilots, i)
     _start_law(autopilots, inbox, i, own, reference, gains)
     before = fields(_State, autopilots.state[i])
     after, output = _step(before, own, _heard_by(autopilots, inbox, i), reference, model, gains, dt)
@@ -193,7 +204,7 @@ def control(autopilots, inbox, i, dt):
     _set_signals(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
         slot = autopilots.actuator[n]
-        autopilots.command[i, slot] = command_for(autopilots, i, slot, shown[n])
+        autopilots.command[i, slot] = _command_for(autopilots, i, slot, shown[n])
     if autopilots.course[i] == autopilots.course[i]:
         hold_course(own, autopilots.course[i], model, autopilots.command[i])
     return True
@@ -202,5 +213,5 @@ def control(autopilots, inbox, i, dt):
 @compiled
 def publish(autopilots, exchange, events, i, sequence, now_us):
     """Post what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
-    share_health(autopilots, i)
+    _share_health(autopilots, i)
     post(exchange, i, sequence, now_us, events.radio_on[i], autopilots.shared[i])

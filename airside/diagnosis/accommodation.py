@@ -13,7 +13,7 @@ from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR, RUDDER, THRUST
-from ftcc.link.compiled import compiled, compiled_apart, copy, fields
+from ftcc.link.compiled import compiled, compiled_apart, compiled_within, copy, fields
 
 __all__ = ["accommodate", "command_for", "is_accommodated"]
 
@@ -67,13 +67,13 @@ def accommodate(autopilots, i, dt):
         d.own[i, _COMMAND + slot] = assumed[_EFFECTIVENESS] * autopilots.own[i, _COMMAND + slot] + assumed[_BIAS]
 
 
-@compiled
+@compiled_within
 def is_accommodated(autopilots, i):
     """Whether the law of UAV ``i`` flies by ``Diagnosis.own`` and ``Diagnosis.model``."""
     return autopilots.diagnosis.on[i] == 1 and autopilots.diagnosis.accommodates[i] == 1
 
 
-@compiled
+@compiled_within
 def command_for(autopilots, i, slot, wanted):
     """The command by which an actuator of UAV ``i``, by what is believed of it, does what is ``wanted``, rad or N."""
     d = autopilots.diagnosis

@@ -18,7 +18,7 @@ from ftcc.airside.elements.nonlinear import clip
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.references import attitude, longitudinal, position
-from ftcc.link.compiled import compiled, fields, store
+from ftcc.link.compiled import compiled, compiled_within, fields, store
 
 __all__ = ["fly_apart", "place"]
 
@@ -45,7 +45,7 @@ _NEAR, _ALIKE = 1.0, 0.3
 """How near to its place a UAV joins, m, and its speeds, m/s."""
 
 
-@compiled
+@compiled_within
 def _column(autopilots, source):
     """Where all records of the vertical plane have the entry ``source`` of a `longitudinal.Reference`; -1: nowhere."""
     for m in range(autopilots.cooperation.columns[0]):
@@ -54,7 +54,7 @@ def _column(autopilots, source):
     return -1
 
 
-@compiled
+@compiled_within
 def place(autopilots, inbox, i, source, rate):
     """Weighted mean of the neighbours that belong, at present, of an entry of their motion, and of its rate.
 
@@ -77,7 +77,7 @@ def place(autopilots, inbox, i, source, rate):
     return total / weights, rates / weights
 
 
-@compiled
+@compiled_within
 def _begin_lone(autopilots, i, own, row):
     """The virtual leader where the law's own reference is."""
     shared = autopilots.shared[i]
@@ -124,7 +124,7 @@ def _has_arrived(row, V, x, z, z_dot):
     return beside and abs(z - lone.z) < _NEAR and abs(z_dot - lone.z_dot) < _ALIKE and abs(V - lone.V) < _ALIKE
 
 
-@compiled
+@compiled_within
 def _fly_lone(autopilots, inbox, i, joins, hold, own, level, dt):
     """The vertical plane: whether the virtual leader has come back to the UAV's place."""
     c = autopilots.cooperation
@@ -166,7 +166,7 @@ def _fly_straight(row, own, begun, level, dt):
         row[_POST_DOT + axis] += dt * row[_POST_DDOT + axis]
 
 
-@compiled
+@compiled_within
 def fly_apart(autopilots, inbox, i, now_us, period_us):
     """Bring the reference of UAV ``i``, which is apart, to this tick; whether it is back at its place."""
     c, dt = autopilots.cooperation, period_us / 1e6

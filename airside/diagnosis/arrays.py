@@ -104,7 +104,7 @@ class Seen(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """Of k autopilots; a is 4, the slots of the actuators, or 0 where no UAV of the process has diagnosis."""
+    """Of k autopilots of a swarm with active fault tolerance; a is 4, the slots of the actuators."""
 
     on: NDArray[np.int64]
     """(k,): 1 where it is on."""
@@ -113,7 +113,7 @@ class Diagnosis(NamedTuple):
     cooperates: NDArray[np.int64]
     """(k,): 1 where the swarm makes room."""
     shares: NDArray[np.int64]
-    """(1,): index in a record at which `Health` begins; -1: records have none."""
+    """(1,): index in a record at which `Health` begins."""
     columns: NDArray[np.int64]
     """(1,): index in ``signals`` at which beliefs begin."""
     gains: NDArray[np.float64]
@@ -162,11 +162,9 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
     """Before the first tick; ``signals`` and ``shared`` are the numbers of values of the scheme itself."""
     k = len(specs)
     named = [(spec, in_slots(spec.diagnosis.actuators)) for spec in specs]
-    any_on = any(spec.diagnosis.on for spec in specs)
-    a = len(ACTUATORS) if any_on else 0
+    a = len(ACTUATORS)
     trial = np.zeros((k, a, width(Trial)))
-    unset = (0.0,) * len(DiagnosisGains._fields)
-    gains = np.array([spec.diagnosis.gains or unset for spec in specs], np.float64)
+    gains = np.array([spec.diagnosis.gains for spec in specs], np.float64)
     first = Trial._fields.index
     trial[:, :, first("kept_effectiveness")] = 1.0
     trial[:, :, first("candidate_since")] = math.inf
@@ -184,7 +182,7 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
         on=np.array([spec.diagnosis.on and spec.role == "follower" for spec in specs], np.int64),
         accommodates=np.array([spec.diagnosis.accommodates for spec in specs], np.int64),
         cooperates=np.array([spec.diagnosis.cooperates for spec in specs], np.int64),
-        shares=np.array([shared if any_on else -1], np.int64),
+        shares=np.array([shared], np.int64),
         columns=np.array([signals], np.int64),
         gains=gains,
         has=np.array([[name in spec.diagnosis.actuators for name in slots] for spec, slots in named], np.int64),
@@ -202,7 +200,7 @@ def new_diagnosis(specs: Sequence[AutopilotSpec], signals: int, shared: int) -> 
         belief=new_beliefs(k, a),
         health=new_health(k),
         announced=new_announced(k, a),
-        details=new_details(a),
+        details=new_details(),
         assumed=assumed,
         model=np.array([spec.model for spec in specs], np.float64),
         own=np.zeros((k, len(Own._fields))),

@@ -18,7 +18,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.references import attitude, longitudinal, position
 from ftcc.airside.references.profiles import CLAMPED, CLIMB_LIMIT, SINK_LIMIT
 from ftcc.link.channel import Edge
-from ftcc.link.compiled import compiled, compiled_apart, copy, fields
+from ftcc.link.compiled import compiled_apart, compiled_within, copy, fields
 from ftcc.link.events import note
 from ftcc.link.flight_modes import MISSION
 
@@ -56,20 +56,20 @@ _SENDER = Edge._fields.index("sender")
 _NEIGHBOUR_BELONGS = Neighbour._fields.index("belongs")
 
 
-@compiled
+@compiled_within
 def is_apart(autopilots, i):
     """Whether UAV ``i`` flies a reference of its own: it has left, and the ground has not taken it over."""
     d = autopilots.diagnosis
     return d.cooperates[i] == 1 and d.health[i, _BELONGS] == 0.0 and autopilots.mode[i] == MISSION
 
 
-@compiled
+@compiled_within
 def hears_virtual_leader(autopilots, i):
     """Whether the law of UAV ``i`` hears a virtual leader in the place of its neighbours."""
     return is_apart(autopilots, i) and autopilots.cooperation.kind[0] == LONGITUDINAL
 
 
-@compiled
+@compiled_within
 def makes_room(autopilots, i):
     """Whether leader ``i`` holds its climb rate back for a follower."""
     return autopilots.cooperation.apart[i, _LIMIT] < math.inf
@@ -94,7 +94,7 @@ def cooperate(autopilots, inbox, i, now_us, dt):
     _weigh(autopilots, inbox, i, gains, dt)
 
 
-@compiled
+@compiled_within
 def _look_around(autopilots, inbox, i, gains):
     """Set what UAV ``i`` knows of its in-neighbours from their newest records."""
     at = autopilots.diagnosis.shares[0]
@@ -106,7 +106,7 @@ def _look_around(autopilots, inbox, i, gains):
             row[_KNOWN] = 1.0 if inbox.age[i, edge] <= gains.fresh else 0.0
 
 
-@compiled
+@compiled_within
 def _weigh(autopilots, inbox, i, gains, dt):
     """Fade the edges from those who have left out of the sums of UAV ``i``, and in from those who are back.
 
@@ -123,7 +123,7 @@ def _weigh(autopilots, inbox, i, gains, dt):
         autopilots.weight[i, edge] = share * c.weight[i, edge]
 
 
-@compiled
+@compiled_within
 def _make_room(autopilots, inbox, i, gains, now_us, dt):
     """Limit the profile of leader ``i`` to what the weakest follower that belongs can keep up, at a limited pace."""
     c = autopilots.cooperation
@@ -156,7 +156,7 @@ def _make_room(autopilots, inbox, i, gains, now_us, dt):
     autopilots.profile[i, SINK_LIMIT] = min(c.limits[i, 1], limit)
 
 
-@compiled
+@compiled_within
 def _off_its_place(autopilots, inbox, i, gains):
     """How far UAV ``i`` is off its place, over what it may be; 0 where its place is not known.
 
@@ -177,7 +177,7 @@ def _off_its_place(autopilots, inbox, i, gains):
     return math.sqrt(x * x + y * y + z * z) / gains.astray
 
 
-@compiled
+@compiled_within
 def _decide(autopilots, inbox, i, gains, now_us, dt):
     """Whether UAV ``i`` leaves, or begins to fly back."""
     d, row = autopilots.diagnosis, autopilots.cooperation.apart[i]

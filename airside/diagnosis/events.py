@@ -19,7 +19,7 @@ from ftcc.airside.diagnosis.beliefs import (
     Belief,
 )
 from ftcc.link.actuators import unit_of
-from ftcc.link.compiled import compiled, copy, fields, store, width
+from ftcc.link.compiled import compiled_within, copy, fields, store, width
 from ftcc.link.events import CAPACITY, note
 
 __all__ = ["BELIEVES", "Announced", "belief_text", "new_announced", "new_details", "note_beliefs"]
@@ -44,12 +44,12 @@ def new_announced(k: int, actuators: int) -> NDArray[np.float64]:
     return np.zeros((k, actuators, width(Announced)))
 
 
-def new_details(actuators: int) -> NDArray[np.float64]:
+def new_details() -> NDArray[np.float64]:
     """(rows, n): by row of the list of events, the state announced before and the new `Belief`."""
-    return np.zeros((CAPACITY if actuators else 0, 1 + width(Belief)))
+    return np.zeros((CAPACITY, 1 + width(Belief)))
 
 
-@compiled
+@compiled_within
 def note_beliefs(autopilots, i, now_us):
     """Note an event for each actuator of UAV ``i`` of which it believes something else than was last announced.
 

@@ -10,7 +10,7 @@ from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.airside.point_mass import drag
 from ftcc.link.actuators import ELEVATOR, THRUST
-from ftcc.link.compiled import compiled, compiled_apart, copy, fields, store
+from ftcc.link.compiled import compiled, compiled_apart, compiled_within, copy, fields, store
 
 __all__ = ["climb_of_load", "climb_of_thrust", "set_health", "share_health"]
 
@@ -44,12 +44,11 @@ def _largest_load(V, acting, a):
     return force * (a.CL0 + a.CLa * alpha + a.CLde * acting) / (a.m * a.g)
 
 
-@compiled
+@compiled_within
 def share_health(autopilots, i):
-    """Append the `Health` of UAV ``i`` to what it shares, where records have one."""
+    """Append the `Health` of UAV ``i`` to what it shares."""
     d = autopilots.diagnosis
-    if d.shares[0] >= 0:
-        copy(d.health[i], autopilots.shared[i, d.shares[0] :])
+    copy(d.health[i], autopilots.shared[i, d.shares[0] :])
 
 
 @compiled_apart

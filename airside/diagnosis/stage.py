@@ -12,7 +12,7 @@ from ftcc.airside.diagnosis.trial import RECENTLY, try_actuator
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR
-from ftcc.link.compiled import compiled, compiled_apart, copy, fields, store
+from ftcc.link.compiled import compiled_apart, compiled_within, copy, fields, store
 from ftcc.link.rotation import wrapped
 
 __all__ = ["diagnose"]
@@ -60,7 +60,7 @@ def diagnose(autopilots, i, now_us, dt):
     _show(autopilots, i)
 
 
-@compiled
+@compiled_within
 def _begin(d, i, row, now):
     store(Memory(now, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.inf), d.memory[i])
     for slot in range(_ACTUATORS):
@@ -68,7 +68,7 @@ def _begin(d, i, row, now):
         d.trial[i, slot, _FILTERED] = row[_COMMAND + slot]
 
 
-@compiled
+@compiled_within
 def _positions(d, i, past, dt, mean):
     """Move the nominal actuators by a tick under the command in force; their mean positions go into ``mean`` (4,)."""
     for slot in range(_ACTUATORS):
@@ -90,7 +90,7 @@ def _positions(d, i, past, dt, mean):
         trial[_POSITION], trial[_RATE] = position, rate
 
 
-@compiled
+@compiled_within
 def _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now):
     """Watch the navigation solution: whether this tick's step is worth nothing, and the observers of the kinematics.
 
@@ -165,7 +165,7 @@ _SHOWN = 7
 """Entries of a `Belief` that are recorded: the first ones."""
 
 
-@compiled
+@compiled_within
 def _show(autopilots, i):
     """Write beliefs and health behind the scheme's signals, see `belief_signals`."""
     d = autopilots.diagnosis

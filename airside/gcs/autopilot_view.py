@@ -68,7 +68,8 @@ class AutopilotView:
     @property
     def diagnosed(self) -> bool:
         """Whether it diagnoses its own actuators."""
-        return bool(self.autopilots.diagnosis.on[self.i])
+        diagnosis = self.autopilots.diagnosis
+        return diagnosis is not None and bool(diagnosis.on[self.i])
 
     @property
     def home(self) -> Home:

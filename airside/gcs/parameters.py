@@ -321,9 +321,10 @@ def diagnosis_parameter(setting: str) -> str:
 
 def _diagnosis(view: AutopilotView) -> Iterator[Parameter]:
     """Settings of fault detection and isolation, and of making room, where the swarm diagnoses its faults."""
-    if not view.spec.diagnosis.on:
+    diagnosis = view.autopilots.diagnosis
+    if diagnosis is None:
         return
-    in_force = view.autopilots.diagnosis.gains[view.i]
+    in_force = diagnosis.gains[view.i]
     ranges = {name: allowed for allowed, names in DIAGNOSIS_RANGES.items() for name in names.split()}
 
     def one(n: int, name: str, note: Quantity) -> Parameter:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ftcc.airside.diagnosis.beliefs import UNDETERMINED, Belief
+from ftcc.airside.diagnosis.beliefs import SENSOR, UNDETERMINED, Belief, new_health
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
 from ftcc.airside.gcs.autopilot_view import AutopilotView
@@ -149,7 +149,11 @@ _SENSORS = (
 
 def _knows_of_a_fault(view: AutopilotView) -> bool:
     """Whether the UAV believes that something is wrong with an actuator."""
-    return bool((view.autopilots.diagnosis.belief[view.i, :, BELIEF_FIELDS.index("state")] >= UNDETERMINED).any())
+    diagnosis = view.autopilots.diagnosis
+    if diagnosis is None:
+        return False
+    states, kinds = (diagnosis.belief[view.i, :, BELIEF_FIELDS.index(name)] for name in ("state", "kind"))
+    return bool(((states >= UNDETERMINED) & (kinds < SENSOR)).any())
 
 
 def _sys_status(view: AutopilotView) -> Any:
@@ -256,13 +260,12 @@ def _signals(view: AutopilotView) -> Any:
 
 def _beliefs(view: AutopilotView) -> Any:
     diagnosis, i = view.autopilots.diagnosis, view.i
-    # Without diagnosis there are no beliefs: no actuator is known.
     rows = np.zeros((len(ACTUATORS), len(BELIEF_FIELDS)))
-    believed = diagnosis.belief[i]
-    rows[: len(believed)] = believed[:, : len(BELIEF_FIELDS)]
-    unknown = (diagnosis.has[i] == 0) | (len(believed) == 0)
-    rows[unknown] = 0.0
-    rows[unknown, BELIEF_FIELDS.index("state")] = -1.0
+    rows[:, BELIEF_FIELDS.index("state")] = -1.0
+    if diagnosis is None:
+        return float_array(view.now_us, "beliefs", [*rows.ravel().tolist(), *new_health(1).ravel().tolist()])
+    has = diagnosis.has[i] == 1
+    rows[has] = diagnosis.belief[i, has, : len(BELIEF_FIELDS)]
     return float_array(view.now_us, "beliefs", rows.ravel().tolist() + diagnosis.health[i].tolist())
 
 

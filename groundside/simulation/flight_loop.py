@@ -20,7 +20,7 @@ from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, as_sent, decode_command, encode_command
 from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import LINK_REPORT, Inbox, report_link
-from ftcc.link.compiled import compiled, copy, fill
+from ftcc.link.compiled import compiled, compiled_within, copy, fill
 from ftcc.link.exchange import Exchange, new_exchange, newest_slot
 from ftcc.link.messages import AttitudeTarget, StateMessage
 from ftcc.link.timing import Timing, ticks_a_second
@@ -208,7 +208,7 @@ def fly_ticks(world, timing, wire, first, last):
         _advance_vehicles(world, timing, n)
 
 
-@compiled
+@compiled_within
 def _tick_by_wire(world, timing, n):
     """Fly one tick as between processes."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
@@ -230,7 +230,7 @@ def _tick_by_wire(world, timing, n):
                 _publish(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
 
 
-@compiled
+@compiled_within
 def _ideal_tick(world, timing, n):
     """Fly one tick with ideal exchange: all sense, then all share, then all step; a command acts at once."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
@@ -273,13 +273,13 @@ def _ideal_tick(world, timing, n):
             _actuate(world.fleet, i, now / 1e6)
 
 
-@compiled
+@compiled_within
 def _flies(recording, i, now):
     """Return whether UAV ``i`` still flies at ``now`` (us); it does if its law diverged only at this tick."""
     return recording.lost[i] == 0 or (recording.lost[i] == DIVERGED and recording.lost_us[i] == now)
 
 
-@compiled
+@compiled_within
 def _apply_last_command(world, i):
     """Put the last command of UAV ``i`` into force, as a message carries it."""
     fleet, autopilots = world.fleet, world.autopilots
@@ -298,7 +298,7 @@ def _apply_last_command(world, i):
     latch(fleet, i, world.controls)
 
 
-@compiled
+@compiled_within
 def _control_follower(world, timing, i, now):
     """Step the law of a follower; the UAV is lost if its command is not finite."""
     if world.autopilots.leader[i] == 1:
@@ -309,7 +309,7 @@ def _control_follower(world, timing, i, now):
         fill(world.autopilots.signals[i], np.nan)
 
 
-@compiled
+@compiled_within
 def _settle_exchange(world, now, dt):
     """Repeat the ideal exchange at this time until the shared values converge; all UAVs exchange at once.
 
@@ -341,7 +341,7 @@ def _keep(values, places, row):
         row[m] = values[places[m]]
 
 
-@compiled
+@compiled_within
 def _record(world, timing, n):
     """Record a row of each flying UAV, and a report on each of its in-edges, if they are due."""
     recording, fleet, now = world.recording, world.fleet, n * timing.period_us
@@ -363,7 +363,7 @@ def _record(world, timing, n):
                 report_link(world.inbox, i, edge, recording.links[report, i, edge])
 
 
-@compiled
+@compiled_within
 def _advance_vehicles(world, timing, n):
     """Advance the vehicles by one period; a vehicle that leaves its model's valid range is lost."""
     now, recording = n * timing.period_us, world.recording

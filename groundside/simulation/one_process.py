@@ -19,6 +19,7 @@ import psutil  # type: ignore[import-untyped]
 
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.leader import drain_leader_events
+from ftcc.airside.spec import is_active
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.columns import places_kept
 from ftcc.groundside.simulation.flight import Flight
@@ -41,12 +42,14 @@ class PlainPython(UserWarning):
     """A scheme flies as plain Python because numba cannot compile it."""
 
 
-def loop_of(scheme: str, plant: str) -> ModuleType:
-    """Return `flight_loop` for a scheme and a plant: compiled, or plain Python if numba cannot compile the scheme."""
-    stages = stages_of(scheme)
-    loop = instantiate(
-        "ftcc.groundside.simulation.flight_loop", f"{scheme},{plant}", stages=stages, cycle=cycle_of(plant)
-    )
+def loop_of(scheme: str, plant: str, active: bool = False) -> ModuleType:
+    """Return `flight_loop` for a scheme and a plant, with active fault tolerance or without.
+
+    It is compiled, or plain Python if numba cannot compile the scheme.
+    """
+    stages = stages_of(scheme, active)
+    name = f"{scheme},{plant},active" if active else f"{scheme},{plant}"
+    loop = instantiate("ftcc.groundside.simulation.flight_loop", name, stages=stages, cycle=cycle_of(plant))
     if stages.REFUSAL:
         uncompile([loop])
     return loop
@@ -92,7 +95,7 @@ def fly_in_parts(
 ) -> Flight:
     """Fly a mission; pass the recording of every ``room`` ticks to ``take``, and return the last part."""
     timing = mission.timing
-    loop = loop_of(mission.scheme.name, mission.plant)
+    loop = loop_of(mission.scheme.name, mission.plant, is_active(mission.autopilots))
     if loop.stages.REFUSAL:
         warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
     kept = list(places_kept(mission, columns).values())

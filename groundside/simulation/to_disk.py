@@ -10,6 +10,7 @@ from pathlib import Path
 import psutil  # type: ignore[import-untyped]
 
 from ftcc.airside.compiled_stages import stages_of
+from ftcc.airside.spec import is_active
 from ftcc.groundside.results import Run, TableWriter
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.flight import Flight, recorded_columns
@@ -70,7 +71,7 @@ def _conclude(mission: Mission, folder: Path, last: float, flight: Flight) -> Ru
     for t, uav, severity, text in mission.events:
         if t <= last:
             events.write(t, text, uav, severity)
-    if refusal := stages_of(mission.scheme.name).REFUSAL:
+    if refusal := stages_of(mission.scheme.name, is_active(mission.autopilots)).REFUSAL:
         events.write(0.0, refusal, severity="warning")
     for uav, (t, why) in flight.lost.items():
         events.write(t, f"{AIRCRAFT_LOST}{why}", uav, "error")

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.dashboard import Event
 from ftcc.groundside.swarm.flow import Flow
-from ftcc.groundside.swarm.preloading import PLANT_VARIABLE, SCHEME_VARIABLE
+from ftcc.groundside.swarm.preloading import ACTIVE_VARIABLE, PLANT_VARIABLE, SCHEME_VARIABLE
 from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, Lost, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
@@ -102,11 +102,11 @@ _main_module_lock = threading.Lock()
 """Swarms may be started by several threads."""
 
 
-_compiled: list[tuple[str, str]] = []
-"""Schemes and plants that this process has flown; the fork server has loaded the first."""
+_compiled: list[tuple[str, str, bool]] = []
+"""Scheme, plant and whether with active fault tolerance: what has flown; the fork server has loaded the first."""
 
 
-def _compile_beside_fork_server(what: tuple[str, str]) -> None:
+def _compile_beside_fork_server(what: tuple[str, str, bool]) -> None:
     """Compile what the fork server, which runs already, has not loaded: otherwise each child would, at the same time.
 
     Where this fails, the children do it, and report what is wrong.
@@ -199,14 +199,17 @@ class SwarmProcesses:
         """Start all processes."""
         # Imported here, because only the children need them.
         from ftcc.airside.process import main as run_autopilots
+        from ftcc.airside.spec import is_active
         from ftcc.sim.process import main as run_vehicles
 
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         os.environ[SCHEME_VARIABLE] = self.mission.scheme.name
         os.environ[PLANT_VARIABLE] = self.mission.plant
+        active = is_active(self.mission.autopilots)
+        os.environ[ACTIVE_VARIABLE] = str(int(active))
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["ftcc.groundside.swarm.preload"])
-        _compile_beside_fork_server((self.mission.scheme.name, self.mission.plant))
+        _compile_beside_fork_server((self.mission.scheme.name, self.mission.plant, active))
         vehicles = {spec.uav: spec for spec in self.mission.vehicles}
         autopilots = {spec.uav: spec for spec in self.mission.autopilots}
         with no_main_module():

@@ -25,7 +25,7 @@ from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.compiled_stages import flight_of as flight_of_autopilots
 from ftcc.airside.compiled_stages import placeholder as no_autopilot
 from ftcc.airside.group import build_group as build_autopilots
-from ftcc.groundside.swarm.preloading import PLANT_VARIABLE, SCHEME_VARIABLE
+from ftcc.groundside.swarm.preloading import ACTIVE_VARIABLE, PLANT_VARIABLE, SCHEME_VARIABLE
 from ftcc.link.exchange import begin, take_in
 from ftcc.link.recording import LINK_COLUMNS, PartWriter, new_rows
 from ftcc.link.timing import Timing
@@ -37,14 +37,14 @@ from ftcc.sim.spec import placeholder as no_vehicle
 __all__ = ["load"]
 
 
-def load(scheme: str, plant: str) -> None:
-    """Load or compile everything that a swarm of ``scheme`` on ``plant`` executes."""
+def load(scheme: str, plant: str, active: bool) -> None:
+    """Load or compile everything that a swarm of ``scheme`` on ``plant`` executes, ``active``: with diagnosis."""
     timing = Timing(1, 1, 1, 1, 1, 1, 1)
-    spec = no_autopilot(scheme)
+    spec = no_autopilot(scheme, active)
     columns = autopilot_process.columns(recorded_signals(spec))
     rows, link_rows = (new_rows(1, len(recorded)) for recorded in (columns, LINK_COLUMNS))
     autopilots = build_autopilots([spec], timing, rows, link_rows)
-    autopilot_process.load_compiled(autopilots, timing, flight_of_autopilots(scheme))
+    autopilot_process.load_compiled(autopilots, timing, flight_of_autopilots(scheme, active))
     # Python calls these when it sends and receives; loaded in each child, they would cost 5 MB.
     begin(autopilots.transmission, 0, 0, 0, 1)
     take_in(autopilots.transmission, autopilots.exchange)
@@ -56,7 +56,7 @@ def load(scheme: str, plant: str) -> None:
 
 
 if SCHEME_VARIABLE in os.environ:
-    load(os.environ[SCHEME_VARIABLE], os.environ[PLANT_VARIABLE])
+    load(os.environ[SCHEME_VARIABLE], os.environ[PLANT_VARIABLE], os.environ[ACTIVE_VARIABLE] == "1")
 
 gc.freeze()
 gc.enable()

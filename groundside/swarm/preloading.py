@@ -5,7 +5,9 @@ They stand apart from both: whoever imports `preload` loads all that flies, and 
 
 from __future__ import annotations
 
-__all__ = ["PLANT_VARIABLE", "SCHEME_VARIABLE"]
+__all__ = ["ACTIVE_VARIABLE", "PLANT_VARIABLE", "SCHEME_VARIABLE"]
 
 SCHEME_VARIABLE = "FTCC_PRELOAD_SCHEME"
 PLANT_VARIABLE = "FTCC_PRELOAD_PLANT"
+ACTIVE_VARIABLE = "FTCC_PRELOAD_ACTIVE"
+"""1: with active fault tolerance, 0: without."""

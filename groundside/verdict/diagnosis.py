@@ -26,6 +26,7 @@ from ftcc.airside.diagnosis.beliefs import (
     WRONG,
     belief_signals,
 )
+from ftcc.airside.spec import is_active
 from ftcc.groundside.claims import Signals
 from ftcc.link.actuators import in_slots
 from ftcc.sim.faults import STUCK as HOLDS
@@ -181,7 +182,7 @@ class _Acting(NamedTuple):
 
 def is_diagnosed(mission: Mission) -> bool:
     """Return whether the aircraft of a mission diagnose their actuators."""
-    return any(spec.diagnosis.on for spec in mission.autopilots)
+    return is_active(mission.autopilots)
 
 
 def columns_diagnosed(mission: Mission) -> frozenset[str]:

@@ -11,7 +11,7 @@ import pytest
 
 from ftcc.airside.autopilots import Autopilots, build
 from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, MOST_CLIMB, Health
-from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, refer_apart
+from ftcc.airside.diagnosis.cooperation import cooperate, hears_virtual_leader, makes_room, refer_apart
 from ftcc.airside.diagnosis.cooperation_arrays import Apart, Neighbour
 from ftcc.airside.diagnosis.gains import diagnosis_gains
 from ftcc.airside.flight_path import Own
@@ -96,13 +96,18 @@ def leader() -> Lone:
     return Lone(spec(7, neighbours=(*own, *(InNeighbour(j, 0.0) for j in GRAPH.followers))))
 
 
+def advance(autopilots: Autopilots, inbox: Any, i: int, now_us: int, period_us: int) -> None:
+    """As the stage `refer` does."""
+    advance_leader(autopilots, inbox, i, now_us, period_us, makes_room(autopilots, i))
+
+
 def climb_of(flown: Lone, seconds: float, **health: float) -> np.ndarray:
     """Climb rate of a leader at each tick; a follower tells its health all the time, or nobody does."""
     rates = []
     for _ in range(round(seconds / DT)):
         if health:
             flown.hear(3, **health)
-        flown.tick(advance_leader)
+        flown.tick(advance)
         rates.append(flown.autopilots.reference[0, Z_DOT])
     return np.array(rates)
 
