@@ -111,8 +111,7 @@ def plan_of(name: str, samples: int, *, fault: Mapping[str, Any], random: Mappin
         quantities["faults.0.uav"] = choice(scenario.plan.uavs.followers)
         quantities |= {f"faults.0.{key}": value for key, value in random.items()}
     if excited:
-        channel, size = ("b_z", 3.0) if mission.plant in ("position", "guided") else ("d3", 0.5)
-        changes["disturbances"] = [{"at": 0.0, channel: size, "frequency": 2.0}]
+        changes["diagnosis"] = {**HEALTHY["diagnosis"], "gains": {"dither": DITHER}}
     if not limits:
         names = mission.autopilots[0].diagnosis.actuators
         gains = {f"limit_{one}": UNREACHED * limit for one, limit in limits_of(mission).items() if one in names}
@@ -122,6 +121,8 @@ def plan_of(name: str, samples: int, *, fault: Mapping[str, Any], random: Mappin
     return replace(plan, claims=())
 
 
+DITHER = 0.05
+"""Share of the travel by which what needs excitation is excited."""
 UNREACHED = 1e4
 """Factor of a limit that is never reached."""
 

@@ -8,6 +8,8 @@ told is bounded and changes at a limited rate; it is told while the fault is kno
 
 from __future__ import annotations
 
+import math
+
 from ftcc.airside.diagnosis.beliefs import BIAS, FAULTY, HEALTHY, LOSS, WRONG, Belief
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.flight_path import Own
@@ -28,6 +30,10 @@ _MOST = 1.2
 _SHARE = 0.8
 """Largest bias that is told, share of the travel."""
 _EFFECTIVENESS, _BIAS = range(2)
+_TIME = Own._fields.index("t")
+_DITHER, _DITHER_FREQUENCY = (DiagnosisGains._fields.index(name) for name in ("dither", "dither_frequency"))
+_APART = 0.5 * math.pi
+"""Between the dithers of two actuators, rad: they do not add up."""
 
 assert (AILERON, ELEVATOR, RUDDER, THRUST) == (0, 1, 2, 3)
 
@@ -75,11 +81,17 @@ def is_accommodated(autopilots, i):
 
 @compiled_within
 def command_for(autopilots, i, slot, wanted):
-    """The command by which an actuator of UAV ``i``, by what is believed of it, does what is ``wanted``, rad or N."""
+    """The command by which an actuator of UAV ``i``, by what is believed of it, does what is ``wanted``, rad or N.
+
+    The dither, if there is one, comes on top.
+    """
     d = autopilots.diagnosis
-    if not is_accommodated(autopilots, i):
-        return wanted
-    assumed = d.assumed[i, slot]
-    if assumed[_EFFECTIVENESS] == 1.0 and assumed[_BIAS] == 0.0:
-        return wanted
-    return min(max((wanted - assumed[_BIAS]) / assumed[_EFFECTIVENESS], -d.travel[i, slot]), d.travel[i, slot])
+    command, travel = wanted, d.travel[i, slot]
+    if is_accommodated(autopilots, i):
+        assumed = d.assumed[i, slot]
+        if assumed[_EFFECTIVENESS] != 1.0 or assumed[_BIAS] != 0.0:
+            command = min(max((wanted - assumed[_BIAS]) / assumed[_EFFECTIVENESS], -travel), travel)
+    if d.on[i] == 1 and d.gains[i, _DITHER] > 0.0:
+        swing = math.sin(d.gains[i, _DITHER_FREQUENCY] * autopilots.own[i, _TIME] + _APART * slot)
+        command = min(max(command + d.gains[i, _DITHER] * travel * swing, -travel), travel)
+    return command

@@ -88,6 +88,7 @@ class Trial(NamedTuple):
     slow: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
     """The bank of slow actuators, see `decision.follow`."""
     lagging: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
+    off: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
     square: Annotated[NDArray[np.float64], Room((len(SLEWS),))]
     x: Annotated[NDArray[np.float64], Room((STATES,))]
     """State and covariance of the filter, see `estimator`."""

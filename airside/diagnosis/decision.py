@@ -25,11 +25,11 @@ _FORGET = 6.0
 """Time constant of the sums, s."""
 _N, _Y, _U, _YY, _UU, _UY = range(SUMS)
 _TINY = 1e-12
-_RELATIVE = 0.08
+_RELATIVE = 0.04
 """Error of the model, as a share of the position."""
 _INDEPENDENT = 5.0
 """Independent samples of a residual a second: what the model leaves changes slowly."""
-_COSTS = (0.0, 1.0, 1.0, 2.2, 1.4, 0.5, 2.2)
+_COSTS = (0.0, 1.0, 1.0, 2.2, 1.6, 0.5, 2.2)
 """By kind: of its free numbers, in units of log-likelihood."""
 _ALL = 0.8
 """Loss that counts as total."""
@@ -66,59 +66,63 @@ def gather(sums, residual, position, dt):
 
 
 @compiled
-def follow(slow, lagging, square, residual, position, travel, bandwidth, dt):
+def follow(slow, lagging, off, square, residual, position, travel, bandwidth, dt):
     """Move a bank of slow actuators by a tick, and sum up how well each explains the ``residual``.
 
     ``slow`` (4,) are their positions, ``lagging`` (4,) by how much they are behind ``position``, through the filter of
-    the residual, ``square`` (4,) weighted sums of squares of what each leaves unexplained.
+    the residual, ``off`` and ``square`` (4,) weighted sums of what each leaves unexplained, and of its squares.
     """
     for n in range(slow.shape[0]):
         most = SLEWS[n] * travel * dt
         slow[n] += min(max(position - slow[n], -most), most)
         lagging[n] += min(bandwidth * dt, 1.0) * (slow[n] - position - lagging[n])
         away = residual - lagging[n]
+        off[n] = off[n] * (1.0 - dt / _FORGET) + away
         square[n] = square[n] * (1.0 - dt / _FORGET) + away * away
 
 
 @compiled
-def kind_of(sums, square, floor, dt):
-    """The kind of fault that explains the residual best, or `NO_KIND` while none is clearly best.
+def kind_of(sums, off, square, floor, surprises, effectiveness, bias, dt):
+    """The kind of fault that explains the data best, or `NO_KIND` while none is clearly best.
 
-    Each kind is a regression on the position u or a part of it: floating y = -u, stuck y = b - u, loss y = a u, bias
-    y = b, both y = a u + b, or one of the bank of slow actuators. Their mean squares are compared by log-likelihood,
-    with a cost for each free number (minimum description length, Rissanen, Automatica 14, 1978). ``floor`` is the size
-    of residual that errors of the model may leave.
+    Loss, bias, stuck and floating are special cases of loss *and* bias, y = a u + b in the position u: they explain the
+    residual as well, less what the estimator says against them, ``surprises``, in that order (see `surprises_of`). A
+    slow actuator is one of the bank. Mean squares are compared by log-likelihood, with a cost for each free number
+    (minimum description length, Rissanen, Automatica 14, 1978). ``floor`` is the size of residual that errors of the
+    model may leave, ``effectiveness`` the estimate over that of the healthy actuator, ``bias`` the additive effect.
     """
     n = max(sums[_N], 1.0)
     yy, uu, uy = sums[_YY] / n, sums[_UU] / n, sums[_UY] / n
     y, u = sums[_Y] / n, sums[_U] / n
     syy, suu, suy = max(yy - y * y, 0.0), max(uu - u * u, 0.0), uy - u * y
     lines = syy - suy * suy / suu if suu > _TINY else syy
-    slowest = square[0]
-    for m in range(1, square.shape[0]):
-        slowest = min(slowest, square[m])
-    left = (
-        yy,
-        yy - uy * uy / uu if uu > _TINY else yy,
-        syy,
-        lines,
-        syy + 2.0 * suy + suu,
-        yy + 2.0 * uy + uu,
-        slowest / n,
-    )
+    # Where a slow actuator was at the presumed onset is not known.
+    slowest = math.inf
+    for m in range(square.shape[0]):
+        slowest = min(slowest, max(square[m] / n - off[m] / n * off[m] / n, 0.0))
     weight = 0.5 * n * dt * _INDEPENDENT
     least = floor * floor + _RELATIVE * _RELATIVE * uu
+    line = weight * math.log(max(lines, 0.0) + least)
+    slow = weight * math.log(slowest + least)
+    scores = (
+        0.0,
+        line + surprises[0] + _COSTS[LOSS],
+        line + surprises[1] + _COSTS[BIAS],
+        line + _COSTS[WRONG],
+        line + surprises[2] + _COSTS[STUCK],
+        line + surprises[3] + _COSTS[FLOATING],
+        slow + _COSTS[SLOW],
+    )
+    # What is left of the effectiveness is not known better than the nominal effectiveness is.
+    gone = effectiveness < 1.0 - _ALL
+    held = FLOATING if abs(bias) < (1.0 - _ALL) * math.sqrt(uu) else STUCK
+    names = (NO_KIND, FLOATING if gone else LOSS, BIAS, held if gone else WRONG, held, FLOATING, SLOW)
     best = math.inf
     for candidate in range(LOSS, SLOW + 1):
-        best = min(best, weight * math.log(max(left[candidate], 0.0) + least) + _COSTS[candidate])
-    # What is left of the effectiveness is not known better than the nominal effectiveness is.
-    without_loss = FLOATING if uy < -_ALL * uu else LOSS
-    held = FLOATING if abs(y + u) < (1.0 - _ALL) * math.sqrt(uu) else STUCK
-    names = (NO_KIND, without_loss, BIAS, held if suy < -_ALL * suu else WRONG, held, FLOATING, SLOW)
+        best = min(best, scores[candidate])
     kind = NO_KIND
     for candidate in range(LOSS, SLOW + 1):
-        score = weight * math.log(max(left[candidate], 0.0) + least) + _COSTS[candidate]
-        if score - best <= _CLEAR:
+        if scores[candidate] - best <= _CLEAR:
             if kind != NO_KIND and kind != names[candidate]:
                 return NO_KIND
             kind = names[candidate]

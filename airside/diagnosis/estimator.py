@@ -10,9 +10,12 @@ Autom. Control 44, 1999).
 
 from __future__ import annotations
 
+import math
+
+from ftcc.airside.diagnosis.beliefs import BIAS, FLOATING, LOSS
 from ftcc.link.compiled import compiled
 
-__all__ = ["RHO", "STATES", "B", "C", "Y", "correct", "predict", "widen"]
+__all__ = ["RHO", "STATES", "B", "C", "Y", "correct", "given_kind", "predict", "surprises_of", "widen"]
 
 STATES = 4
 """Length of the state."""
@@ -61,3 +64,43 @@ def correct(x, P, noise, faulty):
 def widen(P, entry, deviation):
     """Let the true value of an ``entry`` have jumped by something of this standard deviation."""
     P[entry, entry] += deviation * deviation
+
+
+@compiled
+def given_kind(x, P, kind, effectiveness, bias, sure):
+    """The estimate given that the fault is of a ``kind``: one that has no part of the other entry.
+
+    A loss leaves the additive effect of the healthy actuator, ``bias``, but for ``sure`` (a standard deviation, its
+    unit), a bias leaves its ``effectiveness``; other kinds say nothing of either. The condition is a measurement.
+
+    Returns
+    -------
+    effectiveness, its standard deviation, additive effect less ``bias``, its standard deviation
+    """
+    rho, b, var_rho, var_b, both = x[RHO], x[B], P[RHO, RHO], P[B, B], P[RHO, B]
+    if kind in (LOSS, FLOATING):
+        left = sure * sure
+        gain, away = both / (var_b + left), bias - b
+        # No actuator acts against its command.
+        rho, var_rho = max(rho + gain * away, 0.0), var_rho - gain * both
+        b, var_b = b + var_b / (var_b + left) * away, var_b * left / (var_b + left)
+    elif kind == BIAS:
+        gain = both / var_rho
+        b, var_b = b + gain * (effectiveness - rho), var_b - gain * both
+        rho, var_rho = effectiveness, 0.0
+    return rho, math.sqrt(max(var_rho, 0.0)), b - bias, math.sqrt(max(var_b, 0.0))
+
+
+@compiled
+def surprises_of(x, P, effectiveness, bias, rough):
+    """How little the estimate agrees with a loss, a bias, a stuck, a floating actuator: Wald statistics over two.
+
+    A loss leaves the additive effect of the healthy actuator, ``bias``, a bias its ``effectiveness``; one that is stuck
+    has none of the latter, one that floats neither. ``rough`` (2,) are standard deviations of the model in both; the
+    others are the estimate's own.
+    """
+    rho, b = x[RHO], x[B] - bias
+    var_rho, var_b, both = P[RHO, RHO] + rough[0] * rough[0], P[B, B] + rough[1] * rough[1], P[RHO, B]
+    away = rho - effectiveness
+    floating = (rho * rho * var_b - 2.0 * rho * b * both + b * b * var_rho) / (var_rho * var_b - both * both)
+    return 0.5 * b * b / var_b, 0.5 * away * away / var_rho, 0.5 * rho * rho / var_rho, 0.5 * floating

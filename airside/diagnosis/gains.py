@@ -47,7 +47,7 @@ class DiagnosisGains(NamedTuple):
     limit_rudder: Annotated[float, Q("limit_rudder", "rad s", "likewise", 0.2)]
     limit_load_factor: Annotated[float, Q("limit_load_factor", "s", "likewise", 0.06)]
     limit_bank: Annotated[float, Q("limit_bank", "rad s", "likewise", 0.005)]
-    spread_thrust: Annotated[float, Q("spread_thrust", "N sqrt(s)", "of what moves the aircraft beside it", 1.0)]
+    spread_thrust: Annotated[float, Q("spread_thrust", "N sqrt(s)", "of what moves the aircraft beside it", 4.0)]
     spread_elevator: Annotated[float, Q("spread_elevator", "rad sqrt(s)", "likewise", 0.004)]
     spread_aileron: Annotated[float, Q("spread_aileron", "rad sqrt(s)", "likewise", 0.004)]
     spread_rudder: Annotated[float, Q("spread_rudder", "rad sqrt(s)", "likewise", 0.008)]

@@ -8,7 +8,7 @@ from ftcc.airside.diagnosis.arrays import Memory, Trial
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.diagnosis.health import set_health
 from ftcc.airside.diagnosis.motion import Motion, aircraft_motion, kinematic_slips, point_motion
-from ftcc.airside.diagnosis.trial import RECENTLY, try_actuator
+from ftcc.airside.diagnosis.trial import RECENTLY, bent_by_fault, try_actuator
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
 from ftcc.link.actuators import ACTUATORS, AILERON, ELEVATOR
@@ -144,7 +144,11 @@ def _compare(autopilots, i, gains, memory, now, dt):
     worthless, bank, alpha, beta, until = _contradicts_itself(d, i, own, past, memory, gains, turn, dt, now)
     elapsed = now - memory.begun_at
     # The flight path, that air and disturbances move.
-    unexplained = 0.0 if worthless else turn - dt * memory.path_base
+    by_faults = 0.0
+    for slot in range(_ACTUATORS):
+        if d.has[i, slot] == 1:
+            by_faults += bent_by_fault(d, i, slot)
+    unexplained = 0.0 if worthless else turn - dt * (memory.path_base + by_faults)
     path = (1.0 - min(gains.bandwidth * dt, 1.0)) * memory.path + unexplained
     path_residual = gains.bandwidth * path
     base = memory.path_base

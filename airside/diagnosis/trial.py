@@ -7,12 +7,12 @@ import math
 from ftcc.airside.diagnosis.arrays import RECENT, Seen, Trial
 from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, NO_KIND, SUSPECTED, UNDETERMINED, Belief
 from ftcc.airside.diagnosis.decision import agreeing, follow, gather, kind_of, sum_up
-from ftcc.airside.diagnosis.estimator import RHO, B, C, Y, correct, predict, widen
+from ftcc.airside.diagnosis.estimator import RHO, B, C, Y, correct, given_kind, predict, surprises_of, widen
 from ftcc.airside.diagnosis.motion import Motion
 from ftcc.link.actuators import THRUST
 from ftcc.link.compiled import compiled, compiled_apart, fields, fill, store
 
-__all__ = ["RECENTLY", "try_actuator"]
+__all__ = ["RECENTLY", "bent_by_fault", "try_actuator"]
 
 _LEARNS_AT_LEAST = 0.3
 """Shortest time constant of what the observers learn to expect, s."""
@@ -41,8 +41,25 @@ _LEAST_ALONE = 0.3
 """Guard of the share of an actuator's motion that the flight path does not follow."""
 _STEADY = 0.15
 """Time for which data must speak for the same kind, s."""
+_SURE = 0.2
+"""What is left of an additive effect that a kind of fault has not, in drifts."""
+_ROUGHLY = 0.08
+"""Error of the model, as a share of the position."""
+_UNMODELLED = 0.02
+"""Standard deviation of what errors of the coefficients leave in an effectiveness."""
 _DRIFTS = 5.0
 """Time constant with which a known fault may change, s."""
+
+
+@compiled
+def bent_by_fault(d, i, slot):
+    """How fast what is believed of a fault of this actuator turns the flight path, rad/s."""
+    belief = fields(Belief, d.belief[i, slot])
+    if belief.state < UNDETERMINED:
+        return 0.0
+    trial, motion = fields(Trial, d.trial[i, slot]), fields(Motion, d.motion[i, slot])
+    loss, bias = trial.x[RHO] - trial.kept_effectiveness, trial.x[B] - trial.kept_bias
+    return motion.lift * (loss * d.positions[i, slot] + bias)
 
 
 @compiled
@@ -108,8 +125,8 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
         widen(P, Y, 2.0 * noise)
     correct(x, P, noise, alarmed or slot != THRUST)
     if alarmed:
-        widen(P, RHO, 0.05 * math.sqrt(dt / _DRIFTS))
-        widen(P, B, drift * math.sqrt(dt / _DRIFTS))
+        widen(P, RHO, 0.02 * math.sqrt(dt / _DRIFTS))
+        widen(P, B, 0.5 * drift * math.sqrt(dt / _DRIFTS))
     else:
         widen(P, B, drift * math.sqrt(dt / gains.memory))
     base, kept_effectiveness, kept_bias = trial.direct_base, trial.kept_effectiveness, trial.kept_bias
@@ -163,9 +180,13 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
     else:
         healthy = motion.drift + kept_effectiveness * position + kept_bias
         whole = kept * whole + calm_step - dt * healthy
-        gather(sums, gains.bandwidth * whole, filtered, dt)
-        follow(trial.slow, trial.lagging, trial.square, gains.bandwidth * whole, position, travel, gains.bandwidth, dt)
-        found = kind_of(sums, trial.square, 0.3 * drift, dt)
+        unexplained, bandwidth = gains.bandwidth * whole, gains.bandwidth
+        gather(sums, unexplained, filtered, dt)
+        follow(trial.slow, trial.lagging, trial.off, trial.square, unexplained, position, travel, bandwidth, dt)
+        rough = (math.hypot(kept_sd, _ROUGHLY), math.hypot(_SURE * drift, _ROUGHLY * position))
+        surprises = surprises_of(x, P, kept_effectiveness, kept_bias, rough)
+        share_left = x[RHO] / max(kept_effectiveness, _LEAST_KEPT)
+        found = kind_of(sums, trial.off, trial.square, 0.3 * drift, surprises, share_left, bias, dt)
         if found != candidate:
             candidate, candidate_since = found, now
         elif found != NO_KIND and now - candidate_since >= _STEADY:
@@ -178,10 +199,13 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
             _forget_effectiveness(x, P, gains)
     # Of the healthy actuator's effectiveness, which is not known better than the nominal coefficients are.
     if state >= UNDETERMINED:
-        effectiveness = x[RHO] / max(kept_effectiveness, _LEAST_KEPT)
-        deviation = math.sqrt(max(P[RHO, RHO], 0.0) + effectiveness * kept_sd * effectiveness * kept_sd)
+        rho, rho_sd, bias, bias_sd = given_kind(x, P, kind, kept_effectiveness, kept_bias, _SURE * drift)
+        effectiveness = rho / max(kept_effectiveness, _LEAST_KEPT)
+        ratio_sd = math.hypot(rho_sd, effectiveness * kept_sd)
+        deviation = math.hypot(ratio_sd, _UNMODELLED)
     else:
         effectiveness, deviation = 1.0, gains.sd_coefficient
+        bias_sd = math.sqrt(max(P[B, B], 0.0))
     store(
         Belief(
             state=state,
@@ -189,7 +213,7 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
             effectiveness=effectiveness,
             effectiveness_sd=deviation,
             bias=bias,
-            bias_sd=math.sqrt(max(P[B, B], 0.0)),
+            bias_sd=bias_sd,
             evidence=evidence,
             suspected_at=suspected_at,
             detected_at=detected_at,
@@ -221,6 +245,7 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
             sums=sums,
             slow=trial.slow,
             lagging=trial.lagging,
+            off=trial.off,
             square=trial.square,
             x=x,
             P=P,
@@ -259,6 +284,7 @@ def _look_back(d, i, slot, trial, travel, gains, kept, since, dt):
     first = last - ticks + 1
     whole, filtered = 0.0, fields(Seen, d.recent[i, slot, first % RECENT]).position
     fill(trial.sums, 0.0)
+    fill(trial.off, 0.0)
     fill(trial.square, 0.0)
     fill(trial.lagging, 0.0)
     fill(trial.slow, filtered)
@@ -269,7 +295,7 @@ def _look_back(d, i, slot, trial, travel, gains, kept, since, dt):
         filtered += min(gains.bandwidth * dt, 1.0) * (seen.position - filtered)
         residual = gains.bandwidth * whole
         gather(trial.sums, residual, filtered, dt)
-        follow(trial.slow, trial.lagging, trial.square, residual, seen.position, travel, gains.bandwidth, dt)
+        follow(trial.slow, trial.lagging, trial.off, trial.square, residual, seen.position, travel, gains.bandwidth, dt)
     return whole, filtered
 
 

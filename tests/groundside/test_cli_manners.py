@@ -214,7 +214,7 @@ def test_failures_tells_what_the_aircraft_of_a_scenario_have(ftcc: Callable[...,
     _, whole, _ = ftcc("failures")
     assert "102 SYSTEM_SERVO: 1 aileron, 2 elevator, 3 rudder; 0 all" in whole
     rows = {line.split()[0]: line for line in whole.splitlines() if line[:1].isalpha()}
-    assert re.search(r"longitudinal +- +elevator +- +thrust +containment, demo", rows["longitudinal"])
+    assert re.search(r"longitudinal +- +elevator +- +thrust +active, containment, demo", rows["longitudinal"])
     assert re.search(r"position +bank +load factor +- +thrust +fire_monitoring", rows["position"])
     for arguments, servos in (
         (["containment"], "2 elevator; 0 all"),

@@ -9,6 +9,7 @@ import pytest
 
 from ftcc.airside.diagnosis.beliefs import KINDS
 from ftcc.airside.diagnosis.decision import SLEWS, SUMS, agreeing, follow, gather, kind_of, sum_up
+from ftcc.airside.diagnosis.estimator import surprises_of
 
 DT = 0.01
 L = 20.0
@@ -34,10 +35,22 @@ def test_the_sum_rises_by_what_exceeds_the_drift_and_never_falls_below_zero():
     assert sum_up(0.0, 50.0, 0.03, 1.0, DT) == pytest.approx(DT * 0.97), "no more counts than a full deflection"
 
 
+def kind(sums: np.ndarray, off: np.ndarray, square: np.ndarray, deviation: float) -> str:
+    """The kind that is found with the estimate by least squares, with five independent samples a second."""
+    n, y, u, _, uu, uy = sums
+    information = np.array([[uu, u], [u, n]]) / deviation**2 * 5.0 * DT
+    spread = np.linalg.pinv(information + 1e-6 * np.eye(2))
+    a, b = spread @ (np.array([uy, y]) / deviation**2 * 5.0 * DT)
+    x, P = np.array([0.0, 1.0 + a, b, 0.0]), np.zeros((4, 4))
+    P[1:3, 1:3] = spread
+    surprises = surprises_of(x, P, 1.0, 0.0, (0.02, 0.0))
+    return KINDS[kind_of(sums, off, square, deviation, surprises, 1.0 + a, b, DT)]
+
+
 def decided(actual, seconds: float = 4.0, floor: float = 0.01) -> str:
     """The kind found for an actuator that acts as ``actual(t, u)`` under a lively command, with noise."""
     rng = np.random.default_rng(4)
-    sums, square = np.zeros(SUMS), np.zeros(len(SLEWS))
+    sums, off, square = np.zeros(SUMS), np.zeros(len(SLEWS)), np.zeros(len(SLEWS))
     slow, lagging = np.full(len(SLEWS), -0.2), np.zeros(len(SLEWS))
     residual = position = 0.0
     u_before = -0.2
@@ -48,8 +61,8 @@ def decided(actual, seconds: float = 4.0, floor: float = 0.01) -> str:
         residual += L * DT * (actual(t, u) - u - residual) + 0.01 * math.sqrt(DT) * rng.standard_normal()
         position += L * DT * (u - position)
         gather(sums, residual, position, DT)
-        follow(slow, lagging, square, residual, u, 0.7, L, DT)
-    return KINDS[kind_of(sums, square, floor, DT)]
+        follow(slow, lagging, off, square, residual, u, 0.7, L, DT)
+    return kind(sums, off, square, floor)
 
 
 class Slow:
@@ -64,7 +77,7 @@ class Slow:
 
 
 @pytest.mark.parametrize(
-    ("actual", "kind"),
+    ("actual", "expected"),
     [
         (lambda t, u: 0.5 * u, "loss"),
         (lambda t, u: u + 0.15, "bias"),
@@ -75,14 +88,14 @@ class Slow:
     ],
     ids=["loss", "bias", "loss and bias", "stuck", "floating", "slow"],
 )
-def test_each_kind_is_accommodated_from_the_others(actual, kind):
-    assert decided(actual) == kind
+def test_each_kind_is_distinguished_from_the_others(actual, expected):
+    assert decided(actual) == expected
 
 
 def test_at_a_constant_position_a_loss_is_not_told_from_a_bias():
-    sums, square = np.zeros(SUMS), np.zeros(len(SLEWS))
+    sums, off, square = np.zeros(SUMS), np.zeros(len(SLEWS)), np.zeros(len(SLEWS))
     slow, lagging = np.full(len(SLEWS), -0.2), np.zeros(len(SLEWS))
     for _ in range(400):
         gather(sums, 0.06, -0.2, DT)
-        follow(slow, lagging, square, 0.06, -0.2, 0.7, L, DT)
-    assert KINDS[kind_of(sums, square, 0.01, DT)] == "none"
+        follow(slow, lagging, off, square, 0.06, -0.2, 0.7, L, DT)
+    assert kind(sums, off, square, 0.01) == "none"

@@ -13,6 +13,7 @@ from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import fly_in_memory
 
 ON = ("diagnosis={on=true,gains={drift_elevator=0.03,limit_elevator=0.006}}", "noise.factor=1", "disturbances=[]")
+DITHER = ("diagnosis={on=true,gains={drift_elevator=0.03,limit_elevator=0.006,dither=0.05}}", *ON[1:])
 """Thresholds of the elevator for calm air."""
 AIR = "turbulence={sigma=[0.5,0.5,0.35],length=[200.0,200.0,50.0]}"
 AT = 12.0
@@ -102,7 +103,7 @@ def test_a_repair_is_noticed():
     assert states[-1] == STATES.index("healthy")
 
 
-def test_a_law_that_is_accommodated_compensates_what_it_is_accommodated():
+def test_a_law_that_knows_of_a_loss_compensates_it():
     """The command that the aircraft gets is that which, by the belief, does what the law wants."""
     told = flown(*ON, "diagnosis.accommodate=true", fault("effectiveness=0.4"))
     passive = flown(*ON, fault("effectiveness=0.4"))
@@ -112,3 +113,14 @@ def test_a_law_that_is_accommodated_compensates_what_it_is_accommodated():
     assert not told.lost
     before = told.t < AT
     assert np.array_equal(told.column("elevator_command", 2)[before], passive.column("elevator_command", 2)[before])
+
+
+def test_a_dither_excites_what_level_flight_does_not_show():
+    """The deviation of the effectiveness gets smaller, and the aircraft pays with motion of its elevator."""
+    still, excited = flown(*ON, fault("effectiveness=0.7")), flown(*DITHER, fault("effectiveness=0.7"))
+    deviations = [one.column("effectiveness_sd_elevator", 2)[-1] for one in (still, excited)]
+    assert deviations[1] < 0.8 * deviations[0]
+    before = (still.t > 5.0) & (still.t < AT)
+    moved = [one.column("elevator_command", 2)[before].std() for one in (still, excited)]
+    travel = still.mission.autopilots[0].travel[1]
+    assert moved[1] ** 2 - moved[0] ** 2 == pytest.approx((0.05 * travel) ** 2 / 2.0, rel=0.3)
