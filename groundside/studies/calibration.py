@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -82,6 +83,8 @@ class Calibration:
     plan: StudyPlan
     """One flight; the thresholds of its documents are not yet those that fly."""
     followers: int
+    options: str
+    """What else was given on the command line."""
 
     @property
     def flights(self) -> int:
@@ -138,8 +141,9 @@ class Calibrated:
         """Return the file beside the scenario."""
         one = self.calibration
         version = importlib.metadata.version("ftcc-sitl")
+        command = f"ftcc calibrate {one.name} --hours {one.hours:g} --seed {one.seed}{one.options}"
         lines = [
-            f"# Thresholds of diagnosis, by ftcc calibrate {one.name} --hours {one.hours:g} --seed {one.seed}",
+            f"# Thresholds of diagnosis, by {command}",
             f"# case {one.case}, version {version}, seeds {self.seeds[0]} to {self.seeds[1]}",
             f"# {self.flown:.4g} h of healthy aircraft; the last {self.fresh:.4g} h are fresh and without an alarm:",
             f"# less than {self.alarms_an_hour:.2g} alarms an hour with 95 % confidence",
@@ -207,7 +211,11 @@ def plan_calibration(
     )
     plan = plan_of_fields(name, fields, **chosen)
     followers = len(scenario.plan.uavs.followers)
-    return Calibration(scenario.name, scenario.case, find(name), actuators, hours, plan.draws.seed, plan, followers)
+    given = {"form": [form], "variant": [variants], "duration": [duration], "set": settings}
+    options = "".join(f" --{key} {shlex.quote(str(one))}" for key, values in given.items() for one in values if one)
+    return Calibration(
+        scenario.name, scenario.case, find(name), actuators, hours, plan.draws.seed, plan, followers, options
+    )
 
 
 def _claim(actuator: str) -> str:

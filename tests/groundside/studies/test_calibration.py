@@ -104,7 +104,7 @@ def test_the_file_says_how_it_was_made_and_is_what_the_scenario_flies_with(plann
     text = whole.toml()
     gains = tomllib.loads(text)["diagnosis"]["gains"]
     assert (gains["drift_elevator"], gains["limit_elevator"]) == (found.drift, found.limit)
-    assert "--hours 2 --seed 5" in text
+    assert "--hours 2 --seed 5 --duration 60" in text
     assert "seeds 5 to 46" in text
     mine = tmp_path / "mine.toml"
     mine.write_text(shipped()["containment"].read_text())
