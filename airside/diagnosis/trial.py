@@ -47,6 +47,8 @@ _ROUGHLY = 0.08
 """Error of the model, as a share of the position."""
 _UNMODELLED = 0.02
 """Standard deviation of what errors of the coefficients leave in an effectiveness."""
+_LOOKS_BACK = 1.0
+"""Longest time from the presumed onset to the alarm, s."""
 _DRIFTS = 5.0
 """Time constant with which a known fault may change, s."""
 
@@ -165,14 +167,14 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
     loss, bias = x[RHO] - kept_effectiveness, x[B] - kept_bias
     if evidence >= 1.0:
         if not alarmed:
-            detected_at, suspected_at = now, quiet_at
+            detected_at, suspected_at = now, max(quiet_at, now - _LOOKS_BACK)
         quiet_before = quiet_at
         state, kind, isolated_at = UNDETERMINED, NO_KIND, math.nan
         candidate, candidate_since = NO_KIND, now
         up, down, quiet_at = 0.0, 0.0, now
         if not alarmed:
             x[RHO], x[B] = kept_effectiveness, kept_bias
-        since = now - max(quiet_before, detected_at - 1.0)
+        since = now - max(quiet_before, detected_at - _LOOKS_BACK)
         _begin_anew(d, i, slot, gains, x, P, 0.5 * travel, spread, noise, since, dt)
         whole, filtered = _look_back(d, i, slot, trial, travel, gains, (kept_effectiveness, kept_bias), since, dt)
     elif not alarmed:

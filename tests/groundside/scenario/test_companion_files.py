@@ -79,7 +79,7 @@ def test_a_copy_of_a_shipped_scenario_flies_alone_and_with_copies_of_what_stands
     alone = load(tmp_path / "mine.toml", variants=["off"])
     assert list(forms_and_variants(alone.source)[1]) == ["P", "off", "loss30"]
     assert (alone.plan.claims, resolve(alone).case) == ([], "flight+off")
-    for kind in ("variants", "claims", "study"):
+    for kind in ("variants", "claims", "study", "diagnosis"):
         shutil.copy(shipped()["containment"].with_suffix(f".{kind}.toml"), tmp_path / f"mine.{kind}.toml")
     assert load(tmp_path / "mine.toml").plan == load("containment").plan
 
