@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.diagnosis.ability import end_of
+from ftcc.airside.diagnosis.arrays import Trial
 from ftcc.airside.diagnosis.beliefs import FAULTY, HEALTHY, MOST_CLIMB, SENSOR, Belief, Health
 from ftcc.airside.flight_path import Own
 from ftcc.airside.model import Model
@@ -15,6 +16,7 @@ from ftcc.link.compiled import compiled, compiled_apart, compiled_within, copy, 
 __all__ = ["climb_of_load", "climb_of_thrust", "set_health", "share_health"]
 
 _STATE = Belief._fields.index("state")
+_FILTERED = Trial._fields.index("filtered")
 _LEAST_AIRSPEED = 10.0
 """m/s."""
 _RESERVE = 0.1
@@ -37,11 +39,13 @@ def climb_of_load(load_factor):
 
 
 @compiled
-def _largest_load(V, acting, a):
-    """Largest load factor that an elevator trims whose stroke ends at ``acting`` (rad), eqs. (2.6)-(2.7) at rest."""
+def _load_left(V, acting, a):
+    """Load factor that an elevator adds with what it has left, ``acting`` (rad), eqs. (2.6)-(2.7) at rest.
+
+    What disturbs the aircraft beside its fault is in its present command, so what is left counts from there.
+    """
     force = 0.5 * a.rho * V * V * a.S
-    alpha = -(a.Cm0 + a.Cmde * acting) / a.Cma
-    return force * (a.CL0 + a.CLa * alpha + a.CLde * acting) / (a.m * a.g)
+    return force * (a.CLde - a.CLa * a.Cmde / a.Cma) * acting / (a.m * a.g)
 
 
 @compiled_within
@@ -73,6 +77,9 @@ def set_health(autopilots, i, gains):
                 climb = min(climb, max(climb_of_thrust(V, own.gamma, own.alpha, most, model), 0.0))
         elif slot == ELEVATOR:
             most, known = end_of(d, i, slot, d.travel[i, slot] if d.point[i] == 1 else model.elevator_min)
+            if known and d.point[i] == 0:
+                left = belief.effectiveness * (model.elevator_min - d.trial[i, slot, _FILTERED])
+                most = 1.0 + _load_left(V, left, model)
             if known:
-                climb = min(climb, climb_of_load(most if d.point[i] == 1 else _largest_load(V, most, model)))
+                climb = min(climb, climb_of_load(most))
     store(Health(float(state), least, climb, d.health[i, _BELONGS]), d.health[i])

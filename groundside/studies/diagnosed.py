@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ftcc.airside.diagnosis.beliefs import FAULTY, KINDS, NOT_ACTUATOR, SENSOR, SLOW, STATES, STUCK
+from ftcc.airside.diagnosis.beliefs import BIAS, FAULTY, KINDS, NOT_ACTUATOR, SENSOR, SLOW, STATES, STUCK
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.groundside.claims import tolerance_of
 from ftcc.groundside.results import Run
@@ -86,9 +86,9 @@ def diagnosed(flight: Flight | Run) -> tuple[tuple[float | None, ...], tuple[boo
 def known_faults(faults: Sequence[FaultFound], determined: float) -> list[FaultFound]:
     """Return the faults whose effectiveness was known 5 s after isolation: to less than ``determined``.
 
-    A stuck or a slow actuator has no effectiveness that could be known.
+    A stuck or a slow actuator has no effectiveness that could be known; that of one with a bias alone is no question.
     """
-    without = (KINDS[STUCK], KINDS[SLOW])
+    without = (KINDS[BIAS], KINDS[STUCK], KINDS[SLOW])
     having = (fault for fault in faults if fault.true_kind not in without)
     return [fault for fault in having if fault.determined and 0.0 < fault.effectiveness_sd < determined]
 
