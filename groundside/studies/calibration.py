@@ -211,7 +211,7 @@ def plan_calibration(
     )
     plan = plan_of_fields(name, fields, **chosen)
     followers = len(scenario.plan.uavs.followers)
-    given = {"form": [form], "variant": [variants], "duration": [duration], "set": settings}
+    given: dict[str, Sequence[Any]] = {"form": [form], "variant": [variants], "duration": [duration], "set": settings}
     options = "".join(f" --{key} {shlex.quote(str(one))}" for key, values in given.items() for one in values if one)
     return Calibration(
         scenario.name, scenario.case, find(name), actuators, hours, plan.draws.seed, plan, followers, options
