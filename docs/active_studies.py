@@ -1,4 +1,4 @@
-"""Compares active and passive fault tolerance: ``python docs/active_studies.py [--samples N] [--out DIR] [SCENARIO ...]``.
+"""Compares active and passive fault tolerance: ``python docs/active_studies.py [--samples N] [SCENARIO ...]``.
 
 For each chapter: a copy of the shipped scenario whose leader climbs in three steps, while a random follower loses a
 random share of its thrust at a random time. It is flown with the own law told of the fault and the swarm making room,
