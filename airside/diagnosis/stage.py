@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ftcc.airside.diagnosis.arrays import Memory, Trial
+from ftcc.airside.diagnosis.beliefs import UNDETERMINED, Belief
 from ftcc.airside.diagnosis.gains import DiagnosisGains
 from ftcc.airside.diagnosis.health import set_health
 from ftcc.airside.diagnosis.motion import Motion, aircraft_motion, kinematic_slips, point_motion
@@ -20,6 +21,7 @@ __all__ = ["diagnose"]
 _COMMAND = Own._fields.index("aileron")
 """Index of the first command in `Own`."""
 _ACTUATORS = len(ACTUATORS)
+_STATE = Belief._fields.index("state")
 _POSITION, _RATE, _FILTERED = (Trial._fields.index(name) for name in ("position", "rate", "filtered"))
 _DRIFT, _LIMIT, _SPREAD = (DiagnosisGains._fields.index(f"{word}_thrust") for word in ("drift", "limit", "spread"))
 """Indices of the first of each kind of threshold; their order is thrust, elevator, aileron, rudder, load, bank."""
@@ -36,6 +38,8 @@ _FASTEST_BEND = 1.0
 """Unexplained turn of the flight path that no air makes, rad/s."""
 _FASTEST_TURN = 2.0
 """Turn of the flight path that no aircraft makes, rad/s."""
+_UPSET = 3.0
+"""By how much more is put down to the model while another actuator fails: the aircraft leaves its flight regime."""
 _SETTLING = 2.0
 """Time after the first tick without alarms, s."""
 
@@ -157,12 +161,25 @@ def _compare(autopilots, i, gains, memory, now, dt):
     for slot in range(_ACTUATORS):
         if d.has[i, slot] == 1:
             first = _OF_POINT[slot] if d.point[i] == 1 else _OF_SURFACES[slot]
-            thresholds = (d.gains[i, _DRIFT + first], d.gains[i, _LIMIT + first], d.gains[i, _SPREAD + first])
+            drift = d.gains[i, _DRIFT + first] * (_UPSET if _only_others_fail(d, i, slot) else 1.0)
+            thresholds = (drift, d.gains[i, _LIMIT + first], d.gains[i, _SPREAD + first])
             moved = (unexplained, path_residual, path_residual - mean)
             bent = try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, elapsed, dt)
             if slot == ELEVATOR:
                 base, mean, path = base + bent, mean - bent, path - bent / gains.bandwidth
     store(Memory(memory.begun_at, path, base, mean, bank, alpha, beta, until), d.memory[i])
+
+
+@compiled_within
+def _only_others_fail(d, i, slot):
+    """Whether something is wrong with another actuator of UAV ``i``, and not with this one."""
+    others = False
+    for other in range(_ACTUATORS):
+        if d.has[i, other] == 1 and d.belief[i, other, _STATE] >= UNDETERMINED:
+            if other == slot:
+                return False
+            others = True
+    return others
 
 
 _SHOWN = 7

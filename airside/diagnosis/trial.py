@@ -44,7 +44,9 @@ _STEADY = 0.15
 _SURE = 0.2
 """What is left of an additive effect that a kind of fault has not, in drifts."""
 _ROUGHLY = 0.08
-"""Error of the model, as a share of the position."""
+"""Error of the model, as a share of the position;"""
+_DRAG = 0.25
+"""of the thrust, which is known as well as the drag at speeds that were not flown."""
 _UNMODELLED = 0.02
 """Standard deviation of what errors of the coefficients leave in an effectiveness."""
 _LOOKS_BACK = 1.0
@@ -185,7 +187,8 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
         unexplained, bandwidth = gains.bandwidth * whole, gains.bandwidth
         gather(sums, unexplained, filtered, dt)
         follow(trial.slow, trial.lagging, trial.off, trial.square, unexplained, position, travel, bandwidth, dt)
-        rough = (math.hypot(kept_sd, _ROUGHLY), math.hypot(_SURE * drift, _ROUGHLY * position))
+        roughly = _DRAG if slot == THRUST else _ROUGHLY
+        rough = (math.hypot(kept_sd, roughly), math.hypot(_SURE * drift, roughly * position))
         surprises = surprises_of(x, P, kept_effectiveness, kept_bias, rough)
         share_left = x[RHO] / max(kept_effectiveness, _LEAST_KEPT)
         found = kind_of(sums, trial.off, trial.square, 0.3 * drift, surprises, share_left, bias, dt)
