@@ -86,10 +86,10 @@ def kind_of(sums, off, square, floor, surprises, effectiveness, bias, dt):
     """The kind of fault that explains the data best, or `NO_KIND` while none is clearly best.
 
     Loss, bias, stuck and floating are special cases of loss *and* bias, y = a u + b in the position u: they explain the
-    residual as well, less what the estimator says against them, ``surprises``, in that order (see `surprises_of`). A
-    slow actuator is one of the bank. Mean squares are compared by log-likelihood, with a cost for each free number
-    (minimum description length, Rissanen, Automatica 14, 1978). ``floor`` is the size of residual that errors of the
-    model may leave, ``effectiveness`` the estimate over that of the healthy actuator, ``bias`` the additive effect.
+    residual as well, less what the estimator says against them, see `Surprises`. A slow actuator is one of the bank.
+    Mean squares are compared by log-likelihood, with a cost for each free number (minimum description length, Rissanen,
+    Automatica 14, 1978). ``floor`` is the size of residual that errors of the model may leave, ``effectiveness`` the
+    estimate over that of the healthy actuator, ``bias`` the additive effect.
     """
     n = max(sums[_N], 1.0)
     yy, uu, uy = sums[_YY] / n, sums[_UU] / n, sums[_UY] / n
@@ -106,11 +106,11 @@ def kind_of(sums, off, square, floor, surprises, effectiveness, bias, dt):
     slow = weight * math.log(slowest + least)
     scores = (
         0.0,
-        line + surprises[0] + _COSTS[LOSS],
-        line + surprises[1] + _COSTS[BIAS],
+        line + surprises.loss + _COSTS[LOSS],
+        line + surprises.bias + _COSTS[BIAS],
         line + _COSTS[WRONG],
-        line + surprises[2] + _COSTS[STUCK],
-        line + surprises[3] + _COSTS[FLOATING],
+        line + surprises.stuck + _COSTS[STUCK],
+        line + surprises.floating + _COSTS[FLOATING],
         slow + _COSTS[SLOW],
     )
     # What is left of the effectiveness is not known better than the nominal effectiveness is.

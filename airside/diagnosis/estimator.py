@@ -11,16 +11,26 @@ Autom. Control 44, 1999).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ftcc.airside.diagnosis.beliefs import BIAS, FLOATING, LOSS
 from ftcc.link.compiled import compiled
 
-__all__ = ["RHO", "STATES", "B", "C", "Y", "correct", "given_kind", "predict", "surprises_of", "widen"]
+__all__ = ["RHO", "STATES", "B", "C", "Surprises", "Y", "correct", "given_kind", "predict", "surprises_of", "widen"]
 
 STATES = 4
 """Length of the state."""
 Y, RHO, B, C = range(STATES)
 """Its entries. y is the predicted less the measured sum of motion, so that the measurement is always 0."""
+
+
+class Surprises(NamedTuple):
+    """What speaks against each special case of loss and bias: half a Wald statistic, as a log-likelihood."""
+
+    loss: float
+    bias: float
+    stuck: float
+    floating: float
 
 
 @compiled
@@ -93,7 +103,7 @@ def given_kind(x, P, kind, effectiveness, bias, sure):
 
 @compiled
 def surprises_of(x, P, effectiveness, bias, rough):
-    """How little the estimate agrees with a loss, a bias, a stuck, a floating actuator: Wald statistics over two.
+    """How little the estimate agrees with each of the `Surprises`.
 
     A loss leaves the additive effect of the healthy actuator, ``bias``, a bias its ``effectiveness``; one that is stuck
     has none of the latter, one that floats neither. ``rough`` (2,) are standard deviations of the model in both; the
@@ -103,4 +113,4 @@ def surprises_of(x, P, effectiveness, bias, rough):
     var_rho, var_b, both = P[RHO, RHO] + rough[0] * rough[0], P[B, B] + rough[1] * rough[1], P[RHO, B]
     away = rho - effectiveness
     floating = (rho * rho * var_b - 2.0 * rho * b * both + b * b * var_rho) / (var_rho * var_b - both * both)
-    return 0.5 * b * b / var_b, 0.5 * away * away / var_rho, 0.5 * rho * rho / var_rho, 0.5 * floating
+    return Surprises(0.5 * b * b / var_b, 0.5 * away * away / var_rho, 0.5 * rho * rho / var_rho, 0.5 * floating)

@@ -18,7 +18,8 @@ DRAWS = 20
 
 
 def test_every_scheme_has_a_study() -> None:
-    assert tuple(sorted(name for name, file in shipped().items() if "study" in read(file))) == STUDIED
+    studied = sorted(name for name, file in shipped().items() if "study" in read(file))
+    assert tuple(studied) == ("active", *STUDIED)
 
 
 @pytest.mark.parametrize("name", STUDIED)
@@ -31,3 +32,10 @@ def test_a_shipped_study_asks_something_and_most_of_its_draws_can_fly(name: str)
     assert set(off.split("+")) == {*on.split("+"), "off"}
     assert len({values for values, _, _ in first}) == DRAWS
     assert sum(mission is not None for _, mission, _ in first) >= DRAWS / 2
+
+
+def test_the_study_of_active_compares_what_active_fault_tolerance_adds() -> None:
+    plan = plan_study("active")
+    assert plan.question.endswith("?")
+    assert [case for case, _ in plan.documents] == ["flight", "flight+alone", "flight+passive"]
+    assert all(plan.drawn(plan.trial(3 * draw))[1] is not None for draw in range(DRAWS)), "the fault needs no trim"
