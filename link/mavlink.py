@@ -173,5 +173,5 @@ def as_typed(value: float) -> float:
 
 
 def status_text(severity: int, text: str) -> Any:
-    """A STATUSTEXT, cut to the 50 characters that it holds."""
-    return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:_TEXT])
+    """A STATUSTEXT, cut to the 50 characters that it holds; nothing is left open at its end."""
+    return dialect.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:_TEXT].rstrip(b" (,;"))
