@@ -44,7 +44,7 @@ def end_of(d, i, slot, limit):
     been there, effectiveness and additive effect are uncertain, but not what they do together. Without word from the
     data it does what is asked.
     """
-    if d.belief.shape[1] == 0 or d.has[i, slot] == 0:
+    if d.has[i, slot] == 0:
         return limit, False
     belief = fields(Belief, d.belief[i, slot])
     if belief.state < UNDETERMINED or belief.kind >= SENSOR:

@@ -76,10 +76,10 @@ def set_health(autopilots, i, gains):
             elif known:
                 climb = min(climb, max(climb_of_thrust(V, own.gamma, own.alpha, most, model), 0.0))
         elif slot == ELEVATOR:
-            most, known = end_of(d, i, slot, d.travel[i, slot] if d.point[i] == 1 else model.elevator_min)
+            load, known = end_of(d, i, slot, d.travel[i, slot] if d.point[i] == 1 else model.elevator_min)
             if known and d.point[i] == 0:
                 left = belief.effectiveness * (model.elevator_min - d.trial[i, slot, _FILTERED])
-                most = 1.0 + _load_left(V, left, model)
+                load = 1.0 + _load_left(V, left, model)
             if known:
-                climb = min(climb, climb_of_load(most))
+                climb = min(climb, climb_of_load(load))
     store(Health(float(state), least, climb, d.health[i, _BELONGS]), d.health[i])

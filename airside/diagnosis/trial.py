@@ -115,11 +115,9 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
     filtered = trial.filtered + min(gains.bandwidth * dt, 1.0) * (position - trial.filtered)
 
     # Estimate.
-    if worthless:
-        calm_step = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
-    else:
+    calm_step = modelled = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
+    if not worthless:
         by_air = share * motion.air * moved[0]
-        modelled = dt * (motion.drift + x[C] * motion.regressor + x[RHO] * position + x[B])
         calm_step = modelled + alone * (motion.step - by_air - modelled)
     seen = Seen(calm_step, motion.drift, motion.regressor, position)
     store(seen, d.recent[i, slot, d.recent_at[i] % RECENT])
