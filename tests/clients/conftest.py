@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 import subprocess
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from tests.sitl.conftest import FTCC, Flight
+from tests.support.ports import free_port
 
 FAMILY = "attitude_synchronization"
 
@@ -37,13 +36,6 @@ class Swarm(NamedTuple):
         return subprocess.run(
             [*FTCC, *arguments], env=self.flight.environment, capture_output=True, text=True, timeout=120, check=False
         )
-
-
-def free_port() -> int:
-    """A UDP port that nobody has bound."""
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="module")

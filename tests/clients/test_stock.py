@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.conftest import Swarm, free_port
+from tests.clients.conftest import Swarm
+from tests.support.ports import free_port
 
 STOCK = Path(__file__).parent / "stock"
 TOOLS = Path(sys.executable).parent

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.sitl.conftest import Flight, events, same_flight
+from tests.support.ports import free_port
 
 Ftcc = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -129,8 +130,8 @@ def test_a_held_swarm_waits_for_resume(fly: Callable[..., Flight], ftcc: Ftcc) -
 
 def test_a_given_port_in_use_is_refused_before_anything_starts(ftcc: Ftcc, tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
+        port = free_port()
+        taken.bind(("127.0.0.1", port))
         answer = ftcc("fly", "containment", "--viewer", "none", "--port", str(port), "--out", str(tmp_path / "run"))
     assert answer.returncode == 2
     assert f"port {port} is in use" in answer.stderr + answer.stdout

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import socket
 import statistics
 import threading
 import time
@@ -22,6 +21,7 @@ from ftcc.groundside.dashboard.snapshot import Event, Snapshot
 from ftcc.groundside.dashboard.viewer import viewer_program
 from tests.sitl.conftest import Flight
 from tests.support import rrd
+from tests.support.ports import free_port
 
 DRIVERS = list(Path("/usr/share/vulkan/icd.d").glob("*.json")) if Path("/usr/share/vulkan/icd.d").is_dir() else []
 UAVS = range(1, 9)
@@ -33,12 +33,9 @@ def viewer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     from rerun.experimental import ViewerClient
 
     monkeypatch.setenv("CI", "true")  # no usage statistics
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
     client = ViewerClient.spawn(
         headless=True,
-        port=port,
+        port=free_port(),
         memory_limit="1GB",
         server_memory_limit="128MB",
         executable_path=str(viewer_program()),  # an environment need not be active

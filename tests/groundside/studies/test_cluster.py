@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -18,6 +17,7 @@ import pytest
 from ftcc.groundside.studies import fly_study, open_folder, plan_study
 from ftcc.groundside.studies.campaign import Progress
 from tests.groundside.studies.test_random_studies import scenario_in
+from tests.support.ports import free_port
 
 pytestmark = pytest.mark.slow
 
@@ -48,9 +48,7 @@ class Started:
 @pytest.fixture
 def scheduler() -> Iterator[str]:
     distributed = pytest.importorskip("distributed")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with Started("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"):
         address = f"tcp://127.0.0.1:{port}"
         until = time.monotonic() + 60.0
