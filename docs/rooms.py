@@ -20,6 +20,7 @@ LABELS = {
     "simulation": "flight in one process",
     "dashboard": "live view",
     "results": "a run's folder",
+    "generator": "scenarios in a line",
     "verdict": "how it went",
     "scenario": "files to specs",
     "claims": "what must hold",

@@ -24,7 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.link.graph import Assumption, Graph, GraphError
+from ftcc.link.graph import Graph, GraphError
 
 __all__ = [
     "CLOSE",
@@ -280,14 +280,26 @@ def _column(name: str, signals: Signals, graph: Graph, uav: int) -> Array:
         return outside
     if uav not in graph.followers:
         return np.full(leaders.shape[1], np.nan)
-    place: Array = graph.hull_weights[graph.followers.index(uav)] @ leaders
+    place: Array = _hull_weights(graph)[graph.followers.index(uav)] @ leaders
     return place
+
+
+def _hull_weights(graph: Graph) -> Array:
+    """``graph.hull_weights``, computed once: many claims of many UAVs ask for them."""
+    return _computed_hull_weights(graph.followers, graph.leaders, tuple(graph.weights.items()))
+
+
+@functools.lru_cache(maxsize=4)
+def _computed_hull_weights(
+    followers: tuple[int, ...], leaders: tuple[int, ...], weights: tuple[tuple[tuple[int, int], float], ...]
+) -> Array:
+    return Graph(followers, leaders, dict(weights)).hull_weights
 
 
 def _leader_columns(name: str, signals: Signals, graph: Graph, t: Array) -> Array:
     """Return a column of the leaders at times ``t`` (leaders, n); nan where a leader was not recorded."""
     try:
-        graph.require(Assumption.LEADERS_REACH_ALL)
+        _hull_weights(graph)
     except GraphError as error:
         raise ValueError(f"{', '.join(DERIVED)} need leaders: {error}") from None
     return np.array([_values_at(t, signals.column("t", uav), signals.column(name, uav)) for uav in graph.leaders])

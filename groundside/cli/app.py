@@ -16,6 +16,7 @@ from ftcc.groundside.cli import (
     failures,
     fly,
     ground,
+    new,
     results,
     scenarios,
     search,
@@ -41,6 +42,7 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)
 _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
     "Scenarios": (
         scenarios.list_all,
+        new.new,
         scenarios.check,
         scenarios.simulate,
         scenarios.verify,
