@@ -60,6 +60,7 @@ NOT_RUN = {
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "docker": "needs a container engine",
     "ruff": "is a linter: .ci/run calls it",
     "dask": "runs until Ctrl-C: tests/groundside/studies/test_cluster.py",
     "OMP_NUM_THREADS=1 dask": "runs until Ctrl-C: tests/groundside/studies/test_cluster.py",
