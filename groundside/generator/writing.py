@@ -138,40 +138,55 @@ def _gains(scheme: Scheme) -> str:
 def _claims(request: Request, scheme: Scheme, measured: Mapping[str, float]) -> str:
     """Claims that any swarm should meet: nobody is lost, all settle, and stay inside the hull."""
     end = request.duration
-    last = f"[{end - 10.0:.1f}, {end:.1f}]"
+    whole, last = [0.0, end], [end - 10.0, end]
     claims = [
-        _claim("nobody is lost", "last_time", "t", f"[0.0, {end:.1f}]", "s", "any swarm", end, f"> {end - 0.1:g}")
+        _claim("nobody is lost", "t", "s", "any swarm", end, f"> {end - 0.1:g}", metric="last_time", window=whole)
     ]
     for error in scheme.tracking:
         if not isinstance(error.bound, float):
             continue
         name = f"{error.meaning}: {SETTLED}"
-        time, small = measured.get(name), _SMALL * error.bound
+        time = measured.get(name)
         by = end if time is None else min(1.25 * time + 2.0, end)
         claims += [
             _claim(
-                f"{error.meaning}: at the end", "max_abs", error.name, last, error.unit,
-                "what the scheme allows", 0.0, f"< {error.bound:g}",
+                f"{error.meaning}: at the end", error.name, error.unit, "what the scheme allows", 0.0,
+                f"< {error.bound:g}", metric="max_abs", window=last,
             ),
             _claim(
-                name, "time_until_below", error.name, f"[0.0, {end:.1f}]\nthreshold = {small:g}", "s",
-                "the first flight, and a quarter more", time or 0.0, f"< {by:.1f}",
+                name, error.name, "s", "the first flight, and a quarter more", time or 0.0, f"< {by:.1f}",
+                metric="time_until_below", window=whole, threshold=_SMALL * error.bound,
             ),
         ]  # fmt: skip
     if scheme.graph is Assumption.UNDIRECTED_LEADERS_REACH_ALL:
         claims.append(
-            _claim("outside the leaders' altitudes", "max_abs", "hull_distance", last, "m", "containment", 0.0, "< 0.5")
+            _claim(
+                "outside the leaders' altitudes",
+                "hull_distance",
+                "m",
+                "containment",
+                0.0,
+                "< 0.5",
+                metric="max_abs",
+                window=last,
+            )
         )
     return "# What any swarm of this scheme should show.\n\n" + "\n\n".join(claims)
 
 
 def _claim(
-    name: str, metric: str, signal: str, window: str, unit: str, source: str, expected: float, tolerance: str
+    name: str, signal: str, unit: str, source: str, expected: float, tolerance: str, **how: str | float | list[float]
 ) -> str:
-    return (
-        f'[[claims]]\nname = "{name}"\nmetric = "{metric}"\nsignal = "{signal}"\nwindow = {window}\nunit = "{unit}"\n'
-        f'source = "{source}"\nexpected = {{ flight = {expected:.1f} }}\ntolerance = "{tolerance}"'
-    )
+    """The table of a claim; ``how`` are metric, window and threshold."""
+    said = {"name": name, "signal": signal, **how, "unit": unit, "source": source, "tolerance": tolerance}
+    lines = [f"{key} = {_literal(value)}" for key, value in said.items()]
+    return "\n".join(["[[claims]]", *lines, f"expected = {{ flight = {expected:.1f} }}"])
+
+
+def _literal(value: str | float | list[float]) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"[{', '.join(f'{one:.1f}' for one in value)}]" if isinstance(value, list) else f"{value:g}"
 
 
 def _tables(text: str, names: str) -> str:
