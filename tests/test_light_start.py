@@ -15,6 +15,8 @@ GROUND = {"pydantic", "typer", "click", "rich", "jinja2", "matplotlib", "rerun",
 HEAVY = {"numba", "numpy", "scipy", "pydantic", "pyarrow", "pymavlink", "zenoh", "rerun", "matplotlib"}
 """Each takes longer to load than a command that only tells has to answer."""
 
+PRELOADED = {"FTCC_PRELOAD_SCHEME": "containment", "FTCC_PRELOAD_PLANT": "longitudinal", "FTCC_PRELOAD_ACTIVE": ""}
+
 
 def loaded(program: str, **environment: str) -> set[str]:
     """The modules that a program has loaded when it ends."""
@@ -32,9 +34,7 @@ def loaded(program: str, **environment: str) -> set[str]:
 
 def test_what_is_forked_has_loaded_nothing_that_its_children_do_not_need():
     """Whatever it loads costs every swarm its start."""
-    found = loaded(
-        "import ftcc.groundside.swarm.preload", FTCC_PRELOAD_SCHEME="containment", FTCC_PRELOAD_PLANT="longitudinal"
-    )
+    found = loaded("import ftcc.groundside.swarm.preload", **PRELOADED)
     assert {"numba", "pyarrow"} <= found
     assert not found & GROUND
     assert not [
@@ -47,8 +47,7 @@ def test_what_is_forked_has_no_threads():
     """Not Python's alone: of those that a library starts, such as Arrow's allocator, no child would have any."""
     loaded(
         "import os, ftcc.groundside.swarm.preload\nassert len(os.listdir('/proc/self/task')) == 1",
-        FTCC_PRELOAD_SCHEME="containment",
-        FTCC_PRELOAD_PLANT="longitudinal",
+        **PRELOADED,
         OPENBLAS_NUM_THREADS="1",
     )
 

@@ -7,7 +7,7 @@ __all__ = ["EXAMPLES"]
 EXAMPLES = {
     "ftcc": "ftcc fly demo",
     "ftcc list": "ftcc list",
-    "ftcc new": "ftcc new mine.toml --followers 12 --leaders 3 --graph nearest:4 --faults 2 --loss 0.2",
+    "ftcc new": "ftcc new mine.toml --followers 12 --graph nearest:4 --faults 2 --loss 0.2",
     "ftcc check": "ftcc check containment --variant loss30",
     "ftcc simulate": "ftcc simulate containment --variant off --set channel.delay=0.02",
     "ftcc verify": "ftcc verify containment --case flight+off --all",

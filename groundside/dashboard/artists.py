@@ -12,6 +12,7 @@ from ftcc.groundside.dashboard.scene import Scene
 from ftcc.groundside.dashboard.snapshot import Snapshot
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.table import Table, event_entries
+from ftcc.groundside.dashboard.timeline import Timeline
 from ftcc.groundside.dashboard.viewer import BLUEPRINT, Entry
 
 __all__ = ["Artists"]
@@ -29,18 +30,21 @@ class Artists:
         self._plots = Plots(subject, self._detail)
         self._diagnosis = DiagnosisPanel(subject, self._detail) if subject.diagnosed else None
         self._table = Table(subject, self._detail)
+        self._timeline = Timeline(subject)
 
     def static(self) -> list[Entry]:
         """Return the entries that are logged once, the blueprint first."""
         attitudes = self._attitudes.static() if self._attitudes is not None else []
         pace = self._pace.static() if self._pace is not None else []
         beliefs = self._diagnosis.static() if self._diagnosis is not None else []
-        return [self._layout(), *self._scene.static(), *attitudes, *self._plots.static(), *beliefs, *pace]
+        curves = [*self._plots.static(), *beliefs, *pace]
+        return [self._layout(), *self._scene.static(), *attitudes, *curves, *self._timeline.static()]
 
     def draw(self, snapshot: Snapshot) -> list[Entry]:
         """Return the entries of one snapshot and its events."""
         new = self._detail.update(snapshot)
         entries = [*self._scene.draw(snapshot, new), *self._plots.draw(snapshot, new), *self._table.draw(snapshot)]
+        entries += self._timeline.draw(snapshot)
         if self._attitudes is not None:
             entries += self._attitudes.draw(snapshot, new)
         if self._diagnosis is not None:
@@ -58,5 +62,7 @@ class Artists:
         return [self._layout(), *self._pace.static(), *self._pace.draw(snapshot)]
 
     def _layout(self) -> Entry:
-        layout = blueprint(self._scene, self._attitudes, self._plots, self._table, self._pace, self._diagnosis)
+        layout = blueprint(
+            self._scene, self._attitudes, self._plots, self._table, self._timeline, self._pace, self._diagnosis
+        )
         return Entry(BLUEPRINT, None, layout)

@@ -28,6 +28,8 @@ __all__ = ["LANE", "TRAIL", "Scene"]
 
 TRAIL = {"containment": 5.0, "formation": 5.0, "attitude": 5.0, "fire": 40.0}
 """Length of the trails, s, by family."""
+_LONG_TRAIL = 30.0
+"""Likewise in the view from the side, where paths show climbs and descents."""
 LANE = 12.0
 """Sideways distance at which aircraft of one vertical plane are drawn, m."""
 
@@ -96,24 +98,38 @@ class Scene:
         notes += ["outlines: references"] if self._references else []
         notes += self._surroundings.notes
         notes += [MARKS_NOTE] if self._marks is not None else []
-        return "Swarm about its moving centre" + (f" ({', '.join(notes)})" if notes else "")
+        return "Swarm" + (f" ({', '.join(notes)})" if notes else "")
+
+    @property
+    def is_longitudinal(self) -> bool:
+        """Whether the swarm moves in a vertical plane."""
+        return self._subject.family in ("containment", "formation")
 
     def view(self) -> rrb.Spatial3DView:
         """Return the view of the swarm, from behind, right and above."""
         eye = self._radius * np.array([0.45, -1.6, 1.05])
+        return self._seen_from(eye, -0.05 * self._radius, TRAIL[self._subject.family], self.title)
+
+    def side_view(self) -> rrb.Spatial3DView:
+        """Return the vertical plane in which the swarm moves, with the paths of the last `_LONG_TRAIL` seconds."""
+        eye = self._radius * np.array([1.7, -0.8, 0.12])
+        return self._seen_from(eye, 0.0, _LONG_TRAIL, "Vertical plane")
+
+    def _seen_from(self, eye: NDArray[np.float64], target: float, trail: float, name: str) -> rrb.Spatial3DView:
+        """Return a view of the swarm from ``eye``, m from its centre, with trails of so many seconds."""
         return rrb.Spatial3DView(
             origin="/world/centre",
             contents="/world/**",
-            name=self.title,
+            name=name,
             eye_controls=rrb.EyeControls3D(
-                kind=rrb.Eye3DKind.Orbital, position=eye, look_target=(0.0, 0.0, -0.05 * self._radius), eye_up=(0, 0, 1)
+                kind=rrb.Eye3DKind.Orbital, position=eye, look_target=(0.0, 0.0, target), eye_up=(0, 0, 1)
             ),
             line_grid=rrb.LineGrid3D(visible=False),
             overrides={
                 "/world/trails": [
                     rrb.VisibleTimeRanges(
                         timeline="t",
-                        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL[self._subject.family]),
+                        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-trail),
                         end=rrb.TimeRangeBoundary.cursor_relative(),
                     )
                 ]
@@ -231,8 +247,7 @@ class Scene:
             return
         in_plane, abreast = (np.ptp(known[:, :2], axis=0) < 1.0).tolist()
         # Ranks only for longitudinal schemes without obstacles, where horizontal positions carry no information.
-        longitudinal = self._subject.family in ("containment", "formation")
-        in_ranks = self._detail.crowded and abreast and longitudinal and not self._subject.obstacles
+        in_ranks = self._detail.crowded and abreast and self.is_longitudinal and not self._subject.obstacles
         if not (in_plane or in_ranks):
             return
         width = math.ceil(math.sqrt(2 * n)) if in_ranks else n
