@@ -22,6 +22,7 @@ EXAMPLES = {
     "ftcc watch": "ftcc watch --no-browser",
     "ftcc doctor": "ftcc doctor containment --speed 10",
     "ftcc report": "ftcc report runs/demo-20260101-120000 --csv signals.csv --kml tracks.kml",
+    "ftcc export": "ftcc export runs/demo-20260101-120000 --format mcap --out flight.mcap",
     "ftcc compare": "ftcc compare runs/with runs/without --out runs/compared",
     "ftcc replay": "ftcc replay runs/demo-20260101-120000 --viewer native",
     "ftcc vehicles": "ftcc vehicles",

@@ -1,15 +1,18 @@
-"""The commands that look at what was recorded: report, compare."""
+"""The commands that look at what was recorded: report, compare, export."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ftcc.groundside.cli.common import Strict, end_by, fail, terminal, warn
 
-__all__ = ["compare", "report"]
+if TYPE_CHECKING:
+    from ftcc.groundside.results import Run
+
+__all__ = ["compare", "export", "report"]
 
 
 def report(
@@ -35,7 +38,7 @@ def report(
     """
     from ftcc.groundside.claims import failed
     from ftcc.groundside.report import as_json, show, write_report
-    from ftcc.groundside.results import NothingRecordedError, Run, RunError, export
+    from ftcc.groundside.results import NothingRecordedError, Run
     from ftcc.groundside.studies import is_study
 
     if is_study(run):
@@ -64,11 +67,7 @@ def report(
         show(terminal(), recorded, results)
     for kind, file in exports.items():
         if file is not None:
-            try:
-                made = export(recorded, kind, file)
-            except OSError as error:
-                raise RunError(f"--{kind} {file}: cannot be written: {error.strerror or error}") from None
-            written.print(f"wrote {', '.join(map(str, made))}", highlight=False, soft_wrap=True)
+            _export(recorded, kind, file, f"--{kind} {file}")
     if page and not json:
         written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
     if strict:
@@ -102,6 +101,37 @@ def _report_study(folder: Path, json: bool, latex: Path | None, page: bool) -> N
         written.print(f"wrote {latex}", highlight=False, soft_wrap=True)
     if page and not json and not printed:
         written.print(f"wrote {study.report()}", markup=False, highlight=False, soft_wrap=True)
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
+    format: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="csv, parquet, mat, ulog, mcap, rosbag2, kml or gpx.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="File, or folder for ulog and rosbag2; default: in RUN/export."),
+    ] = None,
+) -> None:
+    """Export the recording of a run for other programs: tables, logs of PX4, Foxglove and ROS, tracks for maps."""
+    from ftcc.groundside.results import Run
+    from ftcc.groundside.studies import is_study
+
+    if is_study(run):
+        fail(f"{run}: is a study, whose table is study.parquet; export one of its flights")
+    _export(Run(run), format, out, f"--out {out}" if out else str(run / "export"))
+
+
+def _export(run: Run, format: str, target: Path | None, what: str) -> None:
+    """Export a run and print the files; ``what`` names the place in the message if it cannot be written."""
+    from ftcc.groundside.results import RunError
+    from ftcc.groundside.results import export as write
+
+    try:
+        made = write(run, format, target)
+    except OSError as error:
+        raise RunError(f"{what}: cannot be written: {error.strerror or error}") from None
+    terminal(stderr=True).print(f"wrote {', '.join(map(str, made))}", markup=False, highlight=False, soft_wrap=True)
 
 
 def compare(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,12 @@ class ColumnReader:
             for uav, count in zip(*np.unique(self._group(group, ["uav"])[0], return_counts=True), strict=True):
                 rows[int(uav)] = rows.get(int(uav), 0) + int(count)
         return dict(sorted(rows.items()))
+
+    def blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """All columns by name, block by block in order of time, then UAV: a long flight takes no more memory."""
+        names = list(self.columns)
+        for group in range(self._open.num_row_groups):
+            yield dict(zip(names, self._group(group, names), strict=True))
 
     def _group(self, group: int, names: list[str]) -> list[NDArray[Any]]:
         """Read columns of one row group, for all UAVs together."""

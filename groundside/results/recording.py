@@ -57,7 +57,7 @@ class Recording(abc.ABC):
         MissingPackageError
             If pandas is not installed.
         """
-        require("pandas", "to_arrow()")
+        require("pandas", "to_pandas", "to_arrow()")
         table = self.to_arrow()
         frame = table.to_pandas()
         frame.attrs["units"] = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
@@ -71,7 +71,39 @@ class Recording(abc.ABC):
         MissingPackageError
             If polars is not installed.
         """
-        return require("polars", "to_arrow()").from_arrow(self.to_arrow())
+        return require("polars", "to_polars", "to_arrow()").from_arrow(self.to_arrow())
+
+    def to_xarray(self) -> Any:
+        """All columns as an ``xarray.Dataset`` of dimensions ``time`` (s) and ``uav`` (id); nan where there is no row.
+
+        Unit and meaning of a column are its ``attrs["units"]`` and ``attrs["long_name"]``.
+
+        Raises
+        ------
+        MissingPackageError
+            If xarray is not installed.
+        """
+        xarray = require("xarray", "to_xarray", "to_arrow()")
+        table = self.to_arrow()
+        rows = {name: table.column(name).to_numpy() for name in ("t", "uav")}
+        time, instant = np.unique(rows["t"], return_inverse=True)
+        uav, place = np.unique(rows["uav"], return_inverse=True)
+        notes = {
+            field.name: {"units": field.metadata[b"unit"].decode(), "long_name": field.metadata[b"meaning"].decode()}
+            for field in table.schema
+        }
+        variables = {}
+        for name in table.column_names:
+            if name not in rows:
+                values = np.full((len(time), len(uav)), np.nan)
+                values[instant, place] = table.column(name).to_numpy()
+                variables[name] = (("time", "uav"), values, notes[name])
+        mission = self.mission
+        return xarray.Dataset(
+            variables,
+            {"time": ("time", time, notes["t"]), "uav": ("uav", uav, notes["uav"])},
+            {"scenario": mission.name, "case": mission.case, "seed": mission.timing.seed},
+        )
 
     def claims(self) -> list[Result]:
         """Compare the claims of the flight's case with the recording; see `claims.Result`."""
@@ -81,19 +113,32 @@ class Recording(abc.ABC):
         return evaluate(self, mission.claims, mission.case, mission.graph, mission.timing.duration)
 
 
-def require(package: str, instead: str) -> Any:
-    """Import an optional package; ``instead`` names what does without it.
+def require(package: str, purpose: str, instead: str, install: str = "") -> Any:
+    """Import an optional package.
+
+    Parameters
+    ----------
+    package : str
+        Name of the module to import.
+    purpose : str
+        What needs it.
+    instead : str
+        What does without it.
+    install : str, optional
+        What pip installs; default: the package.
 
     Raises
     ------
     MissingPackageError
         If it is not installed.
     """
+    wanted = package.partition(".")[0]
     try:
-        return importlib.import_module(package)
+        importlib.import_module(wanted)
     except ModuleNotFoundError as error:
-        if error.name != package:
+        if error.name != wanted:
             raise
         raise MissingPackageError(
-            f"to_{package}: {package} is not installed; install it with: pip install {package}, or use {instead}"
+            f"{purpose}: {wanted} is not installed; install it with: pip install {install or wanted}, or use {instead}"
         ) from None
+    return importlib.import_module(package)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,6 +141,10 @@ class Run(Recording):
             If there is no such column.
         """
         return self._columns.column(name, uav)
+
+    def blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """All columns by name, block by block in order of time, then UAV: a long flight takes no more memory."""
+        return self._columns.blocks()
 
     def merge(self) -> Path:
         """Merge the processes' parts into ``signals.parquet``; a killed process counts up to its last complete batch.

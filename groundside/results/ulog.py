@@ -5,7 +5,7 @@ pyulog can only write a log that it has read; here its log object is filled dire
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.results.folders import RunError
+from ftcc.groundside.results.poses import poses
 from ftcc.groundside.results.run import Run
-from ftcc.link.home import Home
-from ftcc.sim.plant import TRUTH
 
 __all__ = ["write_ulogs"]
 
-_RATE = 10.0
-"""Highest rate of PX4's topics, Hz; the recording itself keeps its rate."""
 _TYPES = {"uint64_t": "<u8", "int32_t": "<i4", "uint8_t": "u1", "float": "<f4", "double": "<f8"}
 _LEVELS = {"error": ord("3"), "warning": ord("4"), "info": ord("6")}
 """ULog's log level for each severity of an event."""
@@ -63,7 +59,7 @@ def _log_of(run: Run, uav: int) -> Any:
     recorded = {name: run.column(name, uav) for name in run.names if name not in ("t", "uav")}
     columns = {name: values for name, values in recorded.items() if not np.isnan(values).all()}
     _add(log, "ftcc_recording", stamps, [(name, "double", values) for name, values in columns.items()])
-    _add_flight(log, run, stamps, recorded)
+    _add_flight(log, run, uav)
     scheme = run.mission.scheme
     for spec in run.mission.autopilots:
         if spec.uav == uav and spec.role == "follower":
@@ -80,33 +76,21 @@ def _log_of(run: Run, uav: int) -> Any:
     return log
 
 
-def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mapping[str, NDArray[Any]]) -> None:
+def _add_flight(log: Any, run: Run, uav: int) -> None:
     """Add PX4's topics of attitude and position, from the recorded true states."""
-    from ftcc.sim.sensors import encode_state
-
-    if any(name not in recorded for name in TRUTH):
-        raise RunError(f"{run.path}: the vehicles recorded nothing: there is no column {', '.join(TRUTH)}")
-    truth = np.column_stack([recorded[name] for name in TRUTH])
-    chosen = _thin(stamps, np.isfinite(truth[:, :6]).all(axis=1))
-    if not len(chosen):
+    found = poses(run, uav)
+    t = found.time_us
+    if not len(t):
         return
-    t = stamps[chosen]
-    # A point mass has no attitude: it is shown along its path.
-    rows = np.nan_to_num(truth[chosen], nan=0.0)
-    messages = np.empty((len(rows), 13))
-    for row, message in zip(rows, messages, strict=True):
-        encode_state(row, message)
-    home = Home(*run.mission.home)
-    places = np.array([home.place(north, east) for north, east in messages[:, 7:9].tolist()], np.int64)
-    altitude = home.altitude - messages[:, 9]
-    _add(log, "vehicle_attitude", t, [(f"q[{n}]", "float", messages[:, n]) for n in range(4)])
+    motion = np.column_stack([found.position, found.velocity])
+    _add(log, "vehicle_attitude", t, [(f"q[{n}]", "float", found.attitude[:, n]) for n in range(4)])
     _add(
         log,
         "vehicle_local_position",
         t,
         [
-            *((name, "float", messages[:, 7 + n]) for n, name in enumerate(("x", "y", "z", "vx", "vy", "vz"))),
-            ("heading", "float", rows[:, TRUTH.index("chi")]),
+            *((name, "float", motion[:, n]) for n, name in enumerate(("x", "y", "z", "vx", "vy", "vz"))),
+            ("heading", "float", found.heading),
         ],
     )
     _add(
@@ -114,9 +98,9 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
         "vehicle_global_position",
         t,
         [
-            ("lat", "double", places[:, 0] / 1e7),
-            ("lon", "double", places[:, 1] / 1e7),
-            ("alt", "float", altitude),
+            ("lat", "double", found.place[:, 0] / 1e7),
+            ("lon", "double", found.place[:, 1] / 1e7),
+            ("alt", "float", found.altitude),
         ],
     )
     _add(
@@ -125,19 +109,12 @@ def _add_flight(log: Any, run: Run, stamps: NDArray[np.uint64], recorded: Mappin
         t,
         [
             ("time_utc_usec", "uint64_t", t + np.uint64(round(run.started * 1e6))),
-            ("lat", "int32_t", places[:, 0]),
-            ("lon", "int32_t", places[:, 1]),
-            ("alt", "int32_t", np.rint(altitude * 1e3)),
+            ("lat", "int32_t", found.place[:, 0]),
+            ("lon", "int32_t", found.place[:, 1]),
+            ("alt", "int32_t", np.rint(found.altitude * 1e3)),
             ("fix_type", "uint8_t", np.full(len(t), _FIX_3D)),
         ],
     )
-
-
-def _thin(stamps: NDArray[np.uint64], wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return the ``wanted`` rows, at most `_RATE` a second."""
-    rows = np.flatnonzero(wanted)
-    bins = (stamps[rows].astype(np.int64) * int(_RATE)) // 1_000_000
-    return rows[np.unique(bins, return_index=True)[1]]
 
 
 def _add(log: Any, topic: str, stamps: NDArray[np.uint64], columns: _Columns) -> None:

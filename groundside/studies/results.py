@@ -55,7 +55,7 @@ class Study:
         MissingPackageError
             If pandas is not installed.
         """
-        require("pandas", "table")
+        require("pandas", "to_pandas", "table")
         return self.table.to_pandas()
 
     def to_polars(self) -> Any:
@@ -66,7 +66,7 @@ class Study:
         MissingPackageError
             If polars is not installed.
         """
-        return require("polars", "table").from_arrow(self.table)
+        return require("polars", "to_polars", "table").from_arrow(self.table)
 
     def draw(self, folder: str | Path | None = None) -> list[Path]:
         """Draw the figures, by default into the study's folder, and return their files."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import warnings
 from pathlib import Path
@@ -83,7 +84,31 @@ def test_pandas_and_polars_have_the_rows_of_arrow(flight: Flight, run: Run) -> N
         assert frame.attrs["units"]["z"] == "m"
 
 
-@pytest.mark.parametrize("package", ["pandas", "polars"])
+def test_xarray_has_a_row_per_time_and_a_column_per_uav(flight: Flight, run: Run) -> None:
+    pytest.importorskip("xarray")
+    for recording in (flight, run):
+        data = recording.to_xarray()
+        assert dict(data.sizes) == {"time": 151, "uav": 8}
+        assert set(data.data_vars) == set(recording.to_arrow().column_names) - {"t", "uav"}
+        for uav in recording.uavs:
+            for name in ("z", "S1"):
+                np.testing.assert_array_equal(data[name].sel(uav=uav), recording.column(name, uav))
+        np.testing.assert_array_equal(data.time, recording.column("t", 1))
+        assert (data.z.attrs["units"], data.time.attrs["units"]) == ("m", "s")
+        assert data.attrs == {"scenario": "containment", "case": "flight+loss30", "seed": 7}
+
+
+def test_xarray_has_nan_after_a_uav_was_lost(flight: Flight) -> None:
+    pytest.importorskip("xarray")
+    truth = flight.truth.copy()
+    truth[100:, 2] = np.nan
+    z = dataclasses.replace(flight, truth=truth).to_xarray().z
+    assert np.isnan(z[100:, 2]).all()
+    assert np.isfinite(z[:100]).all()
+    assert np.isfinite(z.sel(uav=[1, 2, 4])).all()
+
+
+@pytest.mark.parametrize("package", ["pandas", "polars", "xarray"])
 def test_a_package_that_is_missing_is_one_sentence(
     flight: Flight, monkeypatch: pytest.MonkeyPatch, package: str
 ) -> None:
