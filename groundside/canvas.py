@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
-__all__ = ["DPI", "INK", "STYLE", "WIDTH", "Drawn", "Line2D", "plt", "save"]
+__all__ = ["DPI", "INK", "LOOKS", "PAGE", "STYLE", "WIDTH", "Drawn", "Line2D", "Look", "plt", "save"]
 
 INK = "#010203"
 """Placeholder for the text colour, which the page replaces by its own, so that figures suit light and dark."""
@@ -61,6 +61,54 @@ STYLE: Any = {
 
 
 @dataclass(frozen=True)
+class Look:
+    """Size and type of figures: those of the page, or those that a journal asks for."""
+
+    name: str
+    width: float = WIDTH
+    """Inches."""
+    style: Any = field(default_factory=lambda: STYLE)
+    row: float = 1.9
+    """Height of a row of panels, inches."""
+    columns: int = 3
+    """Most columns of panels."""
+    details: int = 3
+    """Most details in a row."""
+    floating: str = "figure*"
+    """LaTeX's environment: ``figure`` in a column, ``figure*`` across both."""
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether it is for one column: labels are folded, legends have fewer columns."""
+        return self.floating == "figure"
+
+
+PAGE = Look("wide")
+_SIZES = ("font.size", "axes.titlesize", "axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize")
+_EIGHT_POINT = STYLE | dict.fromkeys(_SIZES, 8.0)
+_MM = 1.0 / 25.4
+
+
+def _paper(name: str, column: float, both: float) -> list[Look]:
+    """Return the looks of a journal, for one column and across both (inches)."""
+    narrow = Look(name, column, _EIGHT_POINT, 1.45, columns=1, details=2, floating="figure")
+    return [narrow, Look(f"{name}-wide", both, _EIGHT_POINT)]
+
+
+LOOKS = {
+    look.name: look
+    for look in (
+        PAGE,
+        # IEEE Author Center, "Resolution and Size": 3.5 in for one column, 7.16 in for two.
+        *_paper("ieee", 3.5, 7.16),
+        # Springer, "Artwork and Illustrations Guidelines": 84 mm for one column, 174 mm for two; text of 8 to 12 pt.
+        *_paper("springer", 84.0 * _MM, 174.0 * _MM),
+    )
+}
+"""Looks by name; `PAGE` is that of the page and of figures that ask for no other."""
+
+
+@dataclass(frozen=True)
 class Drawn:
     """A drawn figure and its files."""
 
@@ -69,18 +117,20 @@ class Drawn:
     number: str
     svg: str
     files: tuple[Path, ...]
+    latex: str = ""
+    """How a paper includes it; empty if that was not asked for."""
 
     def _repr_html_(self) -> str:
         """Return the figure as a notebook shows it."""
         return self.svg
 
 
-def save(figure: Any, name: str, title: str, number: str, folder: Path) -> Drawn:
+def save(figure: Any, name: str, title: str, number: str, folder: Path, look: Look = PAGE) -> Drawn:
     """Write a figure as SVG, PDF and PNG, and close it."""
     folder.mkdir(parents=True, exist_ok=True)
     buffer = io.StringIO()
     files = tuple(folder / f"{name}.{kind}" for kind in ("svg", "pdf", "png"))
-    with plt.rc_context(STYLE):
+    with plt.rc_context(look.style):
         # Compute the layout once, not for each format.
         figure.draw_without_rendering()
         figure.set_layout_engine("none")

@@ -21,7 +21,7 @@ EXAMPLES = {
     "ftcc stop": "ftcc stop --all",
     "ftcc watch": "ftcc watch --no-browser",
     "ftcc doctor": "ftcc doctor containment --speed 10",
-    "ftcc report": "ftcc report runs/demo-20260101-120000 --csv signals.csv --kml tracks.kml",
+    "ftcc report": "ftcc report runs/demo-20260101-120000 --style ieee --csv signals.csv",
     "ftcc export": "ftcc export runs/demo-20260101-120000 --format mcap --out flight.mcap",
     "ftcc compare": "ftcc compare runs/with runs/without --out runs/compared",
     "ftcc replay": "ftcc replay runs/demo-20260101-120000 --viewer native",

@@ -30,6 +30,14 @@ def report(
     gpx: Annotated[Path | None, typer.Option(metavar="FILE", help="Export a track per UAV as GPX.")] = None,
     ulog: Annotated[Path | None, typer.Option(metavar="DIR", help="Export a PX4 log (ULog) per UAV.")] = None,
     page: Annotated[bool, typer.Option(help="Write RUN/report, a page with all figures.")] = True,
+    style: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STYLE",
+            help="Write the figures also in this style, into RUN/report/STYLE: ieee or springer for one column, "
+            "ieee-wide or springer-wide for both; default: only wide, as on the page.",
+        ),
+    ] = None,
     strict: Strict = False,
 ) -> None:
     """Show the verdict and the claims of a run, and write a page with its figures; exit code 1 if a claim fails.
@@ -37,18 +45,23 @@ def report(
     Of a study: show how often its claims hold, and write a page with intervals, figures and failed flights.
     """
     from ftcc.groundside.claims import failed
-    from ftcc.groundside.report import as_json, show, write_report
+    from ftcc.groundside.report import as_json, look_of, show, write_report
     from ftcc.groundside.results import NothingRecordedError, Run
     from ftcc.groundside.studies import is_study
 
     if is_study(run):
-        given = {"--csv": csv, "--mat": mat, "--kml": kml, "--gpx": gpx, "--ulog": ulog, "--strict": strict}
+        files = {"--csv": csv, "--mat": mat, "--kml": kml, "--gpx": gpx, "--ulog": ulog}
+        given: dict[str, object] = {**files, "--style": style, "--strict": strict}
         for option in (option for option, value in given.items() if value):
             fail(f"{option}: is for a run; {run} is a study, whose table is study.parquet")
         _report_study(run, json, latex, page)
         return
     if latex is not None:
         fail(f"--latex: is for a study; {run} is none")
+    if style is not None:
+        look_of(style)  # before anything is shown
+        if json or not page:
+            fail("--style: is of figures, which are written with the page: leave out --json and --no-page")
     recorded = Run(run)
     exports = {"csv": csv, "mat": mat, "kml": kml, "gpx": gpx, "ulog": ulog}
     written = terminal(stderr=True)
@@ -59,7 +72,7 @@ def report(
             raise
         warn(str(error))
         if page:
-            written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+            written.print(f"wrote {write_report(recorded, style=style)}", highlight=False, soft_wrap=True)
         raise typer.Exit(1) from None
     if json:
         print(as_json(recorded, results))
@@ -69,7 +82,7 @@ def report(
         if file is not None:
             _export(recorded, kind, file, f"--{kind} {file}")
     if page and not json:
-        written.print(f"wrote {write_report(recorded)}", highlight=False, soft_wrap=True)
+        written.print(f"wrote {write_report(recorded, style=style)}", highlight=False, soft_wrap=True)
     if strict:
         end_by(recorded.verdict)
     if failed(results):

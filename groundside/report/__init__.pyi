@@ -3,6 +3,7 @@ from .page import Cell as Cell
 from .page import Head as Head
 from .page import Section as Section
 from .page import write_html as write_html
+from .plates import look_of as look_of
 from .report import write_report as write_report
 from .terminal import as_json as as_json
 from .terminal import claims_table as claims_table

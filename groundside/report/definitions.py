@@ -20,7 +20,7 @@ from ftcc.link.actuators import unit_of
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Figure", "Panel", "Reading", "Sheet", "plain_sheet", "read_sheet", "sheet_of"]
+__all__ = ["Figure", "Panel", "Reading", "Sheet", "main_panels", "plain_sheet", "read_sheet", "sheet_of"]
 
 _FOLDER = Path(__file__).parent / "figures"
 
@@ -104,7 +104,13 @@ class Sheet(Strict):
     source: str = Field("", description="chapter of the monograph")
     scenarios: list[str] = Field([], description="names of the scenarios that reproduce the monograph")
     figures: list[Figure] = Field(min_length=1)
+    summary: list[Panel] = Field([], max_length=2, description="the picture at the top; default: see `main_panels`")
     notes: list[str] = Field([], description="parts of the monograph that are not drawn or cannot be compared, and why")
+
+
+def main_panels(sheet: Sheet) -> list[Panel]:
+    """Return what a flight of the scheme is about: the sheet's summary, or the first panels of its first figures."""
+    return sheet.summary or [figure.panels[0] for figure in sheet.figures[:2]]
 
 
 def read_sheet(path: Path) -> Sheet:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,9 @@ from ftcc.link.actuators import unit_of
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from ftcc.groundside.canvas import Look
+    from ftcc.groundside.report.plates import Plates
 
 __all__ = ["diagnosis_as_json", "diagnosis_sections", "show_diagnosis"]
 
@@ -123,11 +125,11 @@ def _found_in(run: Run) -> tuple[tuple[FaultFound, ...], tuple[Alarm, ...]]:
     return faults_found(run, events), false_alarms(run, events)
 
 
-def diagnosis_sections(run: Run, folder: Path) -> list[Section]:
+def diagnosis_sections(run: Run, plates: Plates) -> list[Section]:
     """Return the table of faults with a figure per UAV, and the false alarms."""
     faults, alarms = _found_in(run)
     before = [f"Delays of detection and isolation count from the onset. {_ESTIMATES}"]
-    svg = "".join(_draw(run, uav, [f for f in faults if f.uav == uav], folder) for uav in _uavs(faults))
+    svg = "".join(_draw(run, uav, [f for f in faults if f.uav == uav], plates) for uav in _uavs(faults))
     found = Section("faults", "Diagnosis", before if faults else [_NONE], svg, _heads(), [_row(f) for f in faults])
     if not alarms:
         return [Section(**vars(found) | {"after": [_NO_ALARM]})]
@@ -181,17 +183,29 @@ def _table(heads: Sequence[Head], rows: Sequence[Sequence[Cell]]) -> Any:
     return table
 
 
-def _draw(run: Run, uav: int, faults: Sequence[FaultFound], folder: Path) -> str:
+def _draw(run: Run, uav: int, faults: Sequence[FaultFound], plates: Plates) -> str:
     """Draw the estimates of a UAV around each of its faults, with bands, beside the truth; return the SVG."""
-    from ftcc.groundside.canvas import INK, STYLE, WIDTH, Line2D, plt, save
+
+    def draw(look: Look) -> Any:
+        return _figure(run, uav, faults, look)
+
+    drawn = plates.add(f"diagnosis_{uav}", f"Estimates of UAV {uav} beside the truth", "", draw)
+    return "" if drawn is None else drawn.svg
+
+
+def _figure(run: Run, uav: int, faults: Sequence[FaultFound], look: Look) -> Any:
+    from ftcc.groundside.canvas import INK, Line2D, plt
     from ftcc.groundside.palette import GRAY, colors, hexadecimal
+    from ftcc.groundside.report.drawing import add_legend, folded
 
     tint, gray = hexadecimal(colors(run.mission.uavs)[uav]), hexadecimal(GRAY)
     t = run.column("t", uav)
-    with plt.rc_context(STYLE):
-        size = (WIDTH, 0.5 + 1.7 * len(faults))
-        figure, axes = plt.subplots(len(faults), 2, figsize=size, layout="constrained", squeeze=False)
-        for pair, fault in zip(axes, faults, strict=True):
+    with plt.rc_context(look.style):
+        columns = min(2, look.columns)
+        rows_of_axes = 2 * len(faults) // columns
+        size = (look.width, 0.5 + (1.7 if columns == 2 else look.row) * rows_of_axes)
+        figure, axes = plt.subplots(rows_of_axes, columns, figsize=size, layout="constrained", squeeze=False)
+        for pair, fault in zip(axes.reshape(-1, 2), faults, strict=True):
             rows = np.flatnonzero((t >= fault.onset - _BEFORE) & (t <= min(fault.until, fault.onset + _BEHIND)))
             rows = rows[:: max(1, len(rows) // _POINTS)]
             for one, quantity in zip(pair, ("effectiveness", "bias"), strict=True):
@@ -206,7 +220,7 @@ def _draw(run: Run, uav: int, faults: Sequence[FaultFound], folder: Path) -> str
                         one.axvline(moment, linestyle=style, color=gray, linewidth=0.8, zorder=1)
                 unit = unit_of(fault.actuator) if quantity == "bias" else "-"
                 label = f"{quantity} of {fault.actuator.replace('_', ' ')}" + ("" if unit == "-" else f", {unit}")
-                one.set(xlabel="t, s", ylabel=label)
+                one.set(xlabel="t, s", ylabel=folded(label, look))
                 one.margins(x=0.01)
         legend = [
             Line2D([], [], color=tint, label=f"UAV {uav}: estimate, band of {SIGMAS:g} sigma"),
@@ -215,6 +229,5 @@ def _draw(run: Run, uav: int, faults: Sequence[FaultFound], folder: Path) -> str
             Line2D([], [], color=gray, linestyle="--", label="detection"),
             Line2D([], [], color=gray, linestyle="-.", label="isolation"),
         ]
-        figure.legend(handles=legend, loc="outside upper center", ncols=len(legend), handlelength=2.2)
-    name = f"diagnosis_{uav}"
-    return save(figure, name, f"Estimates of UAV {uav} beside the truth", "", folder).svg
+        add_legend(figure, legend, look, handle=2.2)
+    return figure

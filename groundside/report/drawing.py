@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
-from ftcc.groundside.canvas import INK, STYLE, WIDTH, Line2D, plt
+from ftcc.groundside.canvas import INK, PAGE, Line2D, Look, plt
 from ftcc.groundside.claims import unwrapped
 from ftcc.groundside.palette import FIRE, GRAY, colors, hexadecimal
 from ftcc.groundside.report.curves import Flown, curves_of, drawable, last_time, uavs_of
@@ -22,51 +23,81 @@ if TYPE_CHECKING:
 
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["draw", "draw_timeline", "figure_of"]
+__all__ = ["add_legend", "anchor_of", "draw", "draw_timeline", "figure_of", "folded"]
 
 Array = NDArray[np.float64]
 
-_ROW, _LEGEND = 1.9, 0.35
-"""Height of a row of panels, height of the legend, inches."""
+_LEGEND = 0.35
+"""Height of a legend of one line, inches."""
 _TALL = 2.0
 """Height of a row with equal axes, in rows."""
-_IN_A_ROW = 3
-"""Largest number of details in a row."""
 _TICKS_OF_A_DETAIL = 4
 """Largest number of intervals on the time axis of a detail; more labels would overlap."""
+_LABEL = 22
+"""Characters in a line of the label of a narrow figure's axis."""
+_GAPS = 1.5
+"""Between the entries of a narrow figure's legend and beside their lines, in sizes of its letters."""
 _FAR = 3.0
 """Largest distance of a drawn limit from the curves, in heights of the axes."""
 _COLUMNS = 700
 """Number of parts of a curve; of each the least and the greatest value are drawn."""
+_FAULT = (214, 48, 48)
+_FEW = 6
+"""Most marks of faults with names."""
 _RUN_COLORS = ((72, 126, 216), (206, 84, 60), (64, 160, 88), (138, 104, 206), (146, 140, 40), (34, 158, 166))
 """Colours of compared runs."""
 
 
-def draw(candidates: Sequence[Panel], flights: Sequence[Flown], columns: int = 1) -> Any | None:
+def draw(
+    candidates: Sequence[Panel],
+    flights: Sequence[Flown],
+    columns: int = 1,
+    look: Look = PAGE,
+    faults: Sequence[tuple[float, str]] = (),
+) -> Any | None:
     """Draw panels of one flight, coloured by UAV, or of several, coloured by flight; None if no flight has the data.
 
-    Details are placed in rows of their own, other panels in ``columns`` columns.
+    Details are placed in rows of their own, other panels in ``columns`` columns. ``faults`` (time in s, whose) are
+    marked where the axis is time. In an SVG each panel has an id, see `anchor_of`.
     """
-    panels = [panel for panel in candidates if any(drawable(panel, flight) for flight in flights)]
+    panels = {n: panel for n, panel in enumerate(candidates) if any(drawable(panel, flight) for flight in flights)}
     if not panels:
         return None
-    with plt.rc_context(STYLE):
-        wide = [i for i, panel in enumerate(panels) if panel.window is None]
-        details = [i for i, panel in enumerate(panels) if panel.window is not None]
+    with plt.rc_context(look.style):
+        wide = [n for n, panel in panels.items() if panel.window is None]
+        details = [n for n, panel in panels.items() if panel.window is not None]
+        columns = min(columns, look.columns)
         rows = [wide[i : i + columns] for i in range(0, len(wide), columns)]
-        rows += [details[i : i + _IN_A_ROW] for i in range(0, len(details), _IN_A_ROW)]
+        rows += [details[i : i + look.details] for i in range(0, len(details), look.details)]
         width = int(np.lcm.reduce([len(row) for row in rows]))
-        heights = [_TALL if any(panels[i].equal for i in row) else 1.0 for row in rows]
-        mosaic: Any = [[str(i) for i in row for _ in range(width // len(row))] for row in rows]
-        size = (WIDTH, _LEGEND + _ROW * sum(heights))
+        heights = [_TALL if any(panels[n].equal for n in row) else 1.0 for row in rows]
+        mosaic: Any = [[str(n) for n in row for _ in range(width // len(row))] for row in rows]
+        size = (look.width, _LEGEND + look.row * sum(heights))
         figure, axes = plt.subplot_mosaic(mosaic, figsize=size, height_ratios=heights, layout="constrained")
-        for i, panel in enumerate(panels):
-            _draw_panel(axes[str(i)], panel, flights)
-        _legend(figure, panels, flights)
+        for n, panel in panels.items():
+            _draw_panel(axes[str(n)], panel, flights, look)
+            axes[str(n)].set_gid(_panel_id(n))
+        timed = [n for n, panel in panels.items() if panel.x == "t"]
+        named = len(faults) <= _FEW
+        for n in timed:
+            _mark_faults(axes[str(n)], faults, named and n == timed[-1])
+        entries = _legend_entries(list(panels.values()), flights)
+        if faults and timed and not named:
+            entries.append(Line2D([], [], color=hexadecimal(_FAULT), linewidth=0.9, label="fault"))
+        add_legend(figure, entries, look)
     return figure
 
 
-def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
+def _panel_id(number: int) -> str:
+    return f"panel{number}"
+
+
+def anchor_of(figure: str, panel: int) -> str:
+    """Return the id on a page of a panel, given by its place among the candidates of `draw`, of the named figure."""
+    return f"{figure}-{_panel_id(panel)}"
+
+
+def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown], look: Look) -> None:
     several = len(flights) > 1
     for n, flight in enumerate(flights):
         if not drawable(panel, flight):
@@ -93,10 +124,10 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown]) -> None:
     if panel.x == "t" and not several:
         _mark_events(axes, panel, flights[0])
     unit = f", {_pretty(panel.unit)}" if panel.unit and panel.unit != "-" else ""
-    axes.set(xlabel=f"{panel.x_label}, {_pretty(panel.x_unit)}", ylabel=f"{panel.label}{unit}")
+    axes.set(xlabel=f"{panel.x_label}, {_pretty(panel.x_unit)}", ylabel=folded(f"{panel.label}{unit}", look))
     axes.margins(x=0.01)
     if panel.window is not None:
-        axes.locator_params(axis="x", nbins=_TICKS_OF_A_DETAIL)
+        axes.locator_params(axis="x", nbins=_TICKS_OF_A_DETAIL - look.is_narrow)
     if panel.equal:
         axes.set_aspect("equal", adjustable="datalim")
 
@@ -155,7 +186,41 @@ def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
             axes.axvline(t, color=hexadecimal(GRAY), alpha=0.45, linewidth=0.7, zorder=1)
 
 
-def _legend(figure: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> None:
+def folded(label: str, look: Look) -> str:
+    """Return the label of an axis in lines that are no longer than the axis of a narrow figure."""
+    what, comma, unit = label.rpartition(", ")
+    # A unit stays with the word before it.
+    together = f"{what},\u00a0{unit}" if comma else label
+    return textwrap.fill(together, _LABEL, break_long_words=False) if look.is_narrow else label
+
+
+def add_legend(figure: Any, entries: Sequence[Line2D], look: Look, handle: float = 1.6) -> None:
+    """Put a legend above a figure, in as many columns as there is room for; a narrow figure becomes higher for it."""
+    columns = min(len(entries), 8)
+    if look.is_narrow and entries:
+        size = look.style["legend.fontsize"] / 72.0
+        longest = max(len(str(entry.get_label())) for entry in entries)
+        columns = max(1, min(columns, int(look.width / (size * (handle + _GAPS + 0.52 * longest)))))
+        width, height = figure.get_size_inches()
+        lines = -(-len(entries) // columns)
+        figure.set_size_inches(width, height + 1.35 * size * (lines - 1))
+    if entries:
+        gaps = {"columnspacing": 1.0, "handletextpad": 0.5} if look.is_narrow else {}
+        figure.legend(handles=entries, loc="outside upper center", ncols=columns, handlelength=handle, **gaps)
+
+
+def _mark_faults(axes: Axes, faults: Sequence[tuple[float, str]], named: bool) -> None:
+    """Mark faults with lines, and with names beside them."""
+    color = hexadecimal(_FAULT)
+    for t, whose in faults:
+        axes.axvline(t, color=color, linewidth=0.9, zorder=6)
+        if named:
+            place = axes.get_xaxis_transform()
+            text = f"fault, {whose} "
+            axes.text(t, 1.0, text, transform=place, color=color, rotation=90, ha="right", va="top", zorder=6)
+
+
+def _legend_entries(panels: Sequence[Panel], flights: Sequence[Flown]) -> list[Line2D]:
     entries: list[Line2D] = []
     if len(flights) > 1:
         entries += [
@@ -180,8 +245,7 @@ def _legend(figure: Any, panels: Sequence[Panel], flights: Sequence[Flown]) -> N
         entries.append(Line2D([], [], color=red, label="fire, last"))
     if any(panel.true for panel in panels):
         entries.append(Line2D([], [], color=INK, linestyle=":", label="true value"))
-    if entries:
-        figure.legend(handles=entries, loc="outside upper center", ncols=min(len(entries), 8), handlelength=1.6)
+    return entries
 
 
 def _uav_entries(panels: Sequence[Panel], flight: Flown) -> list[Line2D]:
@@ -207,7 +271,7 @@ def _uav_entries(panels: Sequence[Panel], flight: Flown) -> list[Line2D]:
     ]
 
 
-def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: float) -> Any | None:
+def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: float, look: Look = PAGE) -> Any | None:
     """Draw events over time, a row per UAV and one for the whole swarm; None if there are no events."""
     marked = [event for event in events if 0.0 <= float(event["t"]) <= max(last, 0.0)]
     if not marked:
@@ -216,8 +280,8 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
     places = {uav: -i for i, uav in enumerate(rows)}
     tints = {"info": GRAY, "warning": (214, 140, 20), "error": (214, 48, 48)}
     shapes = {"info": "o", "warning": "D", "error": "X"}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=(WIDTH, 0.55 + 0.2 * len(rows)), layout="constrained")
+    with plt.rc_context(look.style):
+        figure, axes = plt.subplots(figsize=(look.width, 0.55 + 0.2 * len(rows)), layout="constrained")
         for event in marked:
             uav = event.get("uav")
             severity = str(event.get("severity", "info"))
@@ -236,16 +300,15 @@ def draw_timeline(events: Sequence[dict[str, Any]], mission: Mission, last: floa
     return figure
 
 
-def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str) -> Any:
+def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str, look: Look = PAGE) -> Any:
     """Draw curves (name, colour, times, values) of non-negative quantities over time, with the axis from zero."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=(WIDTH, _LEGEND + _ROW), layout="constrained")
-        for name, color, t, y in curves:
-            axes.plot(*_thinned(t, y), color=color, label=name)
-        axes.set(xlabel="t, s", ylabel=label)
+    with plt.rc_context(look.style):
+        figure, axes = plt.subplots(figsize=(look.width, _LEGEND + look.row), layout="constrained")
+        lines = [axes.plot(*_thinned(t, y), color=color, label=name)[0] for name, color, t, y in curves]
+        axes.set(xlabel="t, s", ylabel=folded(label, look))
         axes.margins(x=0.01)
         axes.set_ylim(bottom=0.0)
-        figure.legend(loc="outside upper center", ncols=min(len(curves), 8), handlelength=1.6)
+        add_legend(figure, lines, look)
     return figure
 
 

@@ -6,20 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftcc.groundside.canvas import save
+from ftcc.groundside.canvas import Look
 from ftcc.groundside.palette import colors, hexadecimal
 from ftcc.groundside.report.drawing import figure_of
 from ftcc.groundside.report.page import Cell, Head, Section
+from ftcc.groundside.report.plates import Plates
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ftcc.groundside.scenario import Mission
 
 __all__ = ["links_section"]
 
 
-def links_section(links: dict[str, Any], mission: Mission, folder: Path) -> Section:
+def links_section(links: dict[str, Any], mission: Mission, plates: Plates) -> Section:
     """Return a table of records sent, received and lost on each edge, and their age."""
     if not len(links["t"]):
         return Section("links", "Links", before=["The run recorded no links."])
@@ -36,7 +35,7 @@ def links_section(links: dict[str, Any], mission: Mission, folder: Path) -> Sect
         f"Counted by the receivers until {end:g} s. Lost: dropped by the emulated channel, including cuts. Not "
         "delivered: missing in the mesh itself, which happens only on an overloaded computer."
     ]
-    return Section("links", "Links", before, svg=_ages(links, mission, folder), heads=heads, rows=rows)
+    return Section("links", "Links", before, svg=_ages(links, mission, plates), heads=heads, rows=rows)
 
 
 def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:
@@ -58,7 +57,7 @@ def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:
     ]
 
 
-def _ages(links: dict[str, Any], mission: Mission, folder: Path) -> str:
+def _ages(links: dict[str, Any], mission: Mission, plates: Plates) -> str:
     """Draw the greatest age of neighbour states at each UAV over time."""
     tints = colors(mission.uavs)
     curves = []
@@ -71,5 +70,9 @@ def _ages(links: dict[str, Any], mission: Mission, folder: Path) -> str:
             curves.append((f"UAV {uav}", hexadecimal(tints[uav]), t, oldest))
     if not curves:
         return ""
-    made = figure_of(curves, "greatest age received, s")
-    return save(made, "links", "Greatest age of received neighbour states", "", folder).svg
+
+    def draw(look: Look) -> Any:
+        return figure_of(curves, "greatest age received, s", look)
+
+    drawn = plates.add("links", "Greatest age of received neighbour states", "", draw)
+    return "" if drawn is None else drawn.svg

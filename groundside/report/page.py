@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,10 +46,11 @@ class Head:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell with an optional mark: "holds", "fails", "open", "warning" or "error"."""
+    """A cell with an optional mark: "holds", "fails", "open", "warning" or "error"; and a link to an anchor."""
 
     text: str
     mark: str = ""
+    anchor: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,11 @@ class Page:
     facts: list[tuple[str, str]]
     notes: list[str] = field(default_factory=list)
     sections: list[Section] = field(default_factory=list)
+    summary: Drawn | None = None
+    """The picture at the top."""
     figures: list[Drawn] = field(default_factory=list)
+    style: str = ""
+    """Folder of the figures in the style of a journal, beside those of the page; empty: there are none."""
     figures_note: str = ""
     scenario: str = ""
 
@@ -140,12 +145,15 @@ def verdict_section(verdict: Verdict) -> Section:
 _VERDICTS = {True: Cell("holds", "holds"), False: Cell("fails", "fails"), None: Cell("not flown", "open")}
 
 
-def claims_section(results: Sequence[Result], case: str) -> Section:
-    """Return the claims of the scenario with expected and measured values."""
+def claims_section(results: Sequence[Result], case: str, shown: Mapping[int, Cell]) -> Section:
+    """Return the claims of the scenario with expected and measured values.
+
+    ``shown`` says where the signal of a claim is drawn, by the claim's place in ``results``.
+    """
     if not results:
         return Section("claims", "Claims", before=[f"The scenario makes no claims for case {case}."])
     rows = []
-    for result in results:
+    for n, result in enumerate(results):
         claim = result.claim
         start, end = claim.window
         verdict = _VERDICTS[result.ok]
@@ -160,11 +168,12 @@ def claims_section(results: Sequence[Result], case: str) -> Section:
                 Cell(number(result.expected)),
                 Cell(result.tolerance),
                 verdict,
+                shown.get(n, Cell("")),
                 Cell(claim.source),
             ]
         )
     heads = [Head("claim"), Head("UAV"), Head("window, s"), Head("measured", True), Head("expected", True)]
-    heads += [Head("tolerance"), Head("verdict"), Head("source")]
+    heads += [Head("tolerance"), Head("verdict"), Head("shown in"), Head("source")]
     return Section("claims", "Claims", before=[summary(results) + "."], heads=heads, rows=rows)
 
 

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ftcc.groundside.canvas import Drawn, save
+from ftcc.groundside.canvas import PAGE, Drawn, Look
 from ftcc.groundside.claims import Result, evaluate
 from ftcc.groundside.report.curves import Flown
-from ftcc.groundside.report.definitions import Sheet, sheet_of
+from ftcc.groundside.report.definitions import Figure, Sheet, sheet_of
 from ftcc.groundside.report.diagnosis import diagnosis_sections
 from ftcc.groundside.report.drawing import draw, draw_timeline
 from ftcc.groundside.report.links import links_section
+from ftcc.groundside.report.overview import overview
 from ftcc.groundside.report.page import (
     Cell,
     Head,
@@ -25,7 +26,9 @@ from ftcc.groundside.report.page import (
     verdict_section,
     write,
 )
+from ftcc.groundside.report.plates import Plates, look_of
 from ftcc.groundside.report.readings import compare
+from ftcc.groundside.report.shown import figure_of_claims, links_of_claims
 from ftcc.groundside.results import NothingRecordedError, Run, sole_writer
 from ftcc.groundside.verdict import is_diagnosed
 
@@ -47,21 +50,25 @@ class _EmptyRecording:
         return np.empty(0)
 
 
-def write_report(run: Run, folder: Path | None = None) -> Path:
+def write_report(run: Run, folder: Path | None = None, style: str | None = None) -> Path:
     """Write the report of a run, complete or not, and return its page.
 
-    The report of a run without a recording has its scenario, its events, and its claims marked as not flown.
+    The report of a run without a recording has its scenario, its events, and its claims marked as not flown. With a
+    ``style``, a name in ``canvas.LOOKS``, the figures are also written in it, into a folder of its name.
 
     Raises
     ------
+    UserError
+        If there is no such style.
     BusyFolderError
         If another process is writing a report there.
     """
+    look = look_of(style)
     with sole_writer(folder or run.path / "report"):
-        return _write(run, folder or run.path / "report")
+        return _write(run, folder or run.path / "report", look)
 
 
-def _write(run: Run, folder: Path) -> Path:
+def _write(run: Run, folder: Path, look: Look) -> Path:
     mission = run.mission
     notes = []
     try:
@@ -76,46 +83,74 @@ def _write(run: Run, folder: Path) -> Path:
     flown = Flown(mission.case, signals, mission, event_times)
     sheet = sheet_of(mission)
     notes += _unfinished(run, mission, end)
+    plates = Plates(folder, look, _caption([flown]))
+    figures = list(_own_figures(sheet, [flown]))
+    if (others := figure_of_claims(results, figures, flown)) is not None:
+        figures.append(others)
     page = Page(
         title=mission.title,
         subtitle=_subtitle(run, mission),
         facts=[*([("verdict", run.verdict.word)] if signals is run else []), *_facts(run, mission, end, results)],
         notes=notes,
-        figures=draw_figures(sheet, [flown], folder),
+        figures=_draw(figures, [flown], plates),
+        style="" if look is PAGE else look.name,
         figures_note=_figures_note(sheet, mission),
         scenario=mission.toml,
     )
-    timeline = draw_timeline(events, mission, end)
-    svg = save(timeline, "timeline", "Events by time", "", folder).svg if timeline is not None else ""
+    timeline = plates.add("timeline", "Events by time", "", lambda look: draw_timeline(events, mission, end, look))
+    svg = "" if timeline is None else timeline.svg
     if signals is run:
+        page.summary = overview(run, sheet, flown, results, plates)
         page.sections.append(verdict_section(run.verdict))
-    page.sections.append(claims_section(results, mission.case))
+    page.sections.append(claims_section(results, mission.case, links_of_claims(results, figures, flown)))
     if signals is run and is_diagnosed(mission):
-        page.sections += diagnosis_sections(run, folder)
+        page.sections += diagnosis_sections(run, plates)
     if sheet.source and mission.name in sheet.scenarios:
         compared = compare(sheet, flown)
         page.sections.append(compared_section(compared, sheet.source, mission.form, mission.variants, sheet.notes))
     page.sections.append(events_section(events, svg))
-    page.sections.append(links_section(run.links, mission, folder))
+    page.sections.append(links_section(run.links, mission, plates))
     page.sections += _late_section(run)
     page.sections += _versions_section(run)
     return write(page, folder / "index.html")
 
 
-def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path) -> list[Drawn]:
+def draw_figures(sheet: Sheet, flights: Sequence[Flown], folder: Path, look: Look = PAGE) -> list[Drawn]:
     """Draw and write all figures of a sheet for which the flights have data.
 
     Details show time windows of the sheet's own scenarios; they are left out for other scenarios.
     """
+    return _draw(_own_figures(sheet, flights), flights, Plates(folder, look, _caption(flights)))
+
+
+def _own_figures(sheet: Sheet, flights: Sequence[Flown]) -> list[Figure]:
+    """Return the figures of a sheet, without details where the flights are of other scenarios."""
+    if all(flight.mission.name in sheet.scenarios for flight in flights):
+        return sheet.figures
+    without = ([panel for panel in figure.panels if panel.window is None] for figure in sheet.figures)
+    return [
+        figure.model_copy(update={"panels": panels})
+        for figure, panels in zip(sheet.figures, without, strict=True)
+        if panels
+    ]
+
+
+def _draw(figures: Sequence[Figure], flights: Sequence[Flown], plates: Plates) -> list[Drawn]:
     drawn = []
-    own = all(flight.mission.name in sheet.scenarios for flight in flights)
-    for figure in sheet.figures:
-        panels = [panel for panel in figure.panels if own or panel.window is None]
-        made = draw(panels, flights, figure.columns)
-        if made is not None:
-            number = f"Figure {figure.number}" if figure.number else ""
-            drawn.append(save(made, figure.name, figure.title, number, folder))
-    return drawn
+    for figure in figures:
+
+        def made(look: Look, figure: Figure = figure) -> Any | None:
+            return draw(figure.panels, flights, figure.columns, look)
+
+        number = f"Figure {figure.number}" if figure.number else ""
+        drawn.append(plates.add(figure.name, figure.title, number, made))
+    return [one for one in drawn if one is not None]
+
+
+def _caption(flights: Sequence[Flown]) -> str:
+    """Return what flew, for the captions of figures."""
+    names = dict.fromkeys(f"scenario {flight.mission.name}, {flight.mission.case}" for flight in flights)
+    return "; ".join(names)
 
 
 def _subtitle(run: Run, mission: Mission) -> str:

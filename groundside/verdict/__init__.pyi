@@ -4,6 +4,7 @@ from .diagnosis import Alarm as Alarm
 from .diagnosis import FaultFound as FaultFound
 from .diagnosis import columns_diagnosed as columns_diagnosed
 from .diagnosis import false_alarms as false_alarms
+from .diagnosis import fault_onsets as fault_onsets
 from .diagnosis import faults_found as faults_found
 from .diagnosis import is_diagnosed as is_diagnosed
 from .judging import columns_judged as columns_judged

@@ -45,6 +45,7 @@ __all__ = [
     "FaultFound",
     "columns_diagnosed",
     "false_alarms",
+    "fault_onsets",
     "faults_found",
     "is_diagnosed",
     "true_kind",
@@ -241,6 +242,21 @@ def false_alarms(recording: Diagnosed, events: Iterable[Mapping[str, Any]] = ())
         for actuator in _actuators(recording.mission)
         for alarm in _alarms(recording, uav, actuator, faults)
     )
+
+
+def fault_onsets(mission: Mission, events: Iterable[Mapping[str, Any]] = ()) -> tuple[tuple[float, int, str], ...]:
+    """Return time (s), UAV and part (an actuator, "position" or "attitude") of every fault, in order of time.
+
+    Parameters
+    ----------
+    mission : Mission
+        With the faults of its scenario.
+    events : iterable of mapping
+        The event log of a run, which names the faults that were injected in flight.
+    """
+    changes = [(spec.uav, change) for spec in mission.vehicles for change in _planned(mission, spec.uav)]
+    changes += [(event["uav"], change) for event in events for change in _injected(event)]
+    return tuple(sorted((change.time, uav, change.part) for uav, change in changes if change.kind != NO_KIND))
 
 
 def _alarms(recording: Diagnosed, uav: int, actuator: str, faults: Mapping[str, Sequence[_Acting]]) -> Iterator[Alarm]:

@@ -14,6 +14,7 @@ from rich.console import Console
 from ftcc.groundside import Run
 from ftcc.groundside.report import as_json, show
 from ftcc.groundside.report.diagnosis import _alarm_row, _row, diagnosis_sections
+from ftcc.groundside.report.plates import Plates
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import simulate
@@ -67,7 +68,7 @@ def test_a_row_of_the_table_of_false_alarms() -> None:
 
 
 def test_the_page_has_a_table_and_a_figure_of_the_uav_with_the_fault(run: Run, tmp_path: Path) -> None:
-    found, *_ = diagnosis_sections(run, tmp_path)
+    found, *_ = diagnosis_sections(run, Plates(tmp_path))
     (row,) = found.rows
     assert len(row) == len(found.heads)
     assert (row[0].text, row[1].text, row[3].text) == ("1", "elevator", "6.00")

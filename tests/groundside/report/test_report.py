@@ -18,7 +18,7 @@ from ftcc.groundside.claims import check_expression
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.report.comparison import Comparison, labels_of
 from ftcc.groundside.report.curves import Flown
-from ftcc.groundside.report.definitions import Panel, Sheet, plain_sheet, read_sheet, sheet_of
+from ftcc.groundside.report.definitions import Panel, Sheet, main_panels, plain_sheet, read_sheet, sheet_of
 from ftcc.groundside.report.drawing import draw
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.report.report import write_report
@@ -33,7 +33,8 @@ SHEETS = sorted((Path(__file__).parents[3] / "groundside" / "report" / "figures"
 def unknown_columns(sheet: Sheet, columns: Sequence[str]) -> list[str]:
     """Return the errors in a sheet's expressions, given the columns of a recording."""
     wrong = []
-    for figure in sheet.figures:
+    summary = sheet.figures[0].model_copy(update={"name": "summary", "panels": main_panels(sheet), "readings": []})
+    for figure in (summary, *sheet.figures):
         expressions = [*(panel.y for panel in figure.panels), *(reading.y for reading in figure.readings)]
         expressions += [e for p in figure.panels for e in (p.x, p.bound, p.true, p.reference) if e is not None]
         for expression in dict.fromkeys(expressions):
@@ -72,6 +73,7 @@ def few_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module in ("report", "comparison"):
         monkeypatch.setattr(f"ftcc.groundside.report.{module}.sheet_of", first)
+    monkeypatch.setattr("ftcc.groundside.report.report.figure_of_claims", lambda *_: None)
 
 
 def words(page: Path) -> str:
@@ -132,6 +134,60 @@ def test_every_id_on_the_page_is_there_once(report: Path) -> None:
 
 def test_a_scenario_of_ones_own_is_not_held_against_the_monograph(report: Path) -> None:
     assert "Compared with the monograph" not in words(report)
+
+
+def test_a_picture_at_the_top_shows_verdict_and_faults(report: Path) -> None:
+    picture = re.search(r'<figure id="summary">.*?</figure>', report.read_text(), flags=re.S)
+    assert picture is not None
+    assert 'id="summary-panel0"' in picture[0]
+    assert "verdict: as it should be; 8 of 8 claims hold" in picture[0]
+    assert "fault, UAV 1" in picture[0]
+    assert report.read_text().index('id="summary"') < report.read_text().index('id="verdict"')
+
+
+def test_every_claim_leads_to_the_panel_and_the_time_that_show_it(report: Path, demo_run: Run) -> None:
+    html = report.read_text()
+    table = re.search(r'<table class="claims">.*?</table>', html, flags=re.S)
+    assert table is not None
+    links = re.findall(r'<a href="#([^"]+)">([^<]+)</a>', table[0])
+    assert len(links) == len(demo_run.mission.claims) == 8
+    assert [anchor for anchor, _ in links if f'id="{anchor}"' not in html] == []
+    for (_, text), claim in zip(links, demo_run.mission.claims, strict=True):
+        assert text.endswith(f", {claim.window[0]:g} - {claim.window[1]:g} s")
+    # The closest view of the signal: the panel of the fault's two seconds.
+    at_fault = next(anchor for anchor, text in links if "40 - 42 s" in text)
+    drawn = ElementTree.parse(report.parent / f"{at_fault.partition('-')[0]}.svg")
+    panel = next(g for g in drawn.iter("{http://www.w3.org/2000/svg}g") if g.get("id") == at_fault.partition("-")[2])
+    ticks = [
+        float(e.text or "nan")
+        for e in panel.iter("{http://www.w3.org/2000/svg}text")
+        if (e.text or "")[:2] in ("40", "41", "42")
+    ]
+    assert {40.0, 41.0, 42.0} <= set(ticks)
+
+
+@pytest.mark.usefixtures("few_figures")
+def test_figures_come_in_the_size_and_type_of_a_journal(demo_run: Run, tmp_path: Path) -> None:
+    page = write_report(demo_run, tmp_path, "ieee")
+    pdf = (tmp_path / "ieee" / "altitude.pdf").read_bytes()
+    box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", pdf)
+    assert box is not None
+    assert float(box[1]) == pytest.approx(3.5 * 72.0)
+    assert b"/FontFile2" in pdf
+    assert b"/Type3" not in pdf
+    assert set(re.findall(r"font-size: ([\d.]+)px", (tmp_path / "ieee" / "altitude.svg").read_text())) == {"8"}
+    latex = (tmp_path / "ieee" / "altitude.tex").read_text()
+    assert latex == (
+        "\\begin{figure}\n  \\centering\n  \\includegraphics[width=\\columnwidth]{altitude.pdf}\n"
+        "  \\caption{Altitudes between those of the leaders (scenario demo, flight).}\n"
+        "  \\label{fig:altitude}\n\\end{figure}\n"
+    )
+    assert latex.rstrip() in page.read_text()
+    assert "ieee/altitude.pdf" in words(page)
+    wide = (tmp_path / "altitude.tex").read_text()
+    assert "\\begin{figure*}" in wide
+    with pytest.raises(UserError, match=r"style 'acm': there is wide, ieee, ieee-wide, springer, springer-wide"):
+        write_report(demo_run, tmp_path, "acm")
 
 
 # --- runs that are not whole ------------------------------------------------------------------------------------------
@@ -199,6 +255,7 @@ def test_a_sheet_draws_what_its_scheme_records(path: Path) -> None:
     assert set(sheet.scenarios) <= set(shipped())
     flight = fly_in_memory(mission)
     assert unknown_columns(sheet, flight.names) == []
+    assert draw(main_panels(sheet), [Flown("flight", flight, mission)], 2) is not None
     whole = [panel for figure in sheet.figures for panel in figure.panels if panel.window is None]
     made = draw(whole, [Flown("flight", flight, mission)])
     blocks = [block for axes in made.axes for block in axes.collections]

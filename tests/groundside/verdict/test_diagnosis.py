@@ -24,7 +24,7 @@ from ftcc.airside.diagnosis.beliefs import (
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import Mission, resolve
 from ftcc.groundside.simulation import fly_in_memory
-from ftcc.groundside.verdict import Alarm, columns_diagnosed, false_alarms, faults_found
+from ftcc.groundside.verdict import Alarm, columns_diagnosed, false_alarms, fault_onsets, faults_found
 from ftcc.groundside.verdict.diagnosis import true_kind
 from ftcc.sim import faults
 from ftcc.sim.faults import Fault
@@ -137,6 +137,13 @@ def test_faults_injected_in_flight_come_from_the_event_log() -> None:
     assert [(alarm.actuator, alarm.amid) for alarm in false_alarms(flight, log)] == [
         ("elevator", ("thrust", "navigation"))
     ]
+
+
+def test_onsets_are_those_of_the_scenario_and_of_the_event_log() -> None:
+    log = [acts(15.0, "rudder repaired"), acts(41.0, "thrust slow: slew 2"), acts(50.0, "thrust off") | {"outcome": ""}]
+    demo = resolve(load("demo"))
+    assert fault_onsets(demo) == ((40.0, 1, "elevator"),)
+    assert fault_onsets(demo, log) == ((40.0, 1, "elevator"), (41.0, 1, "thrust"))
 
 
 def acts(t: float, text: str) -> dict[str, Any]:
