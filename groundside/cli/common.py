@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ftcc.groundside.verdict import Verdict
 
 __all__ = [
+    "STRICTLY_FAILED",
     "Duration",
     "Form",
     "Out",
@@ -70,7 +71,7 @@ Settings = Annotated[
 
 Strict = Annotated[bool, typer.Option("--strict", help="Exit with code 3 if the verdict is 'failed'.")]
 
-_FAILED = 3
+STRICTLY_FAILED = 3
 """Exit code of ``--strict``."""
 _PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables must not be folded into a file."""
@@ -186,7 +187,7 @@ def end_by(verdict: Verdict) -> None:
     from ftcc.groundside.verdict import FAILED
 
     if verdict.word == FAILED:
-        raise typer.Exit(_FAILED)
+        raise typer.Exit(STRICTLY_FAILED)
 
 
 def show_summary(folder: Path, results: list[Result]) -> None:

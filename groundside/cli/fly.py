@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn
 
 from ftcc.groundside.cli.common import (
+    STRICTLY_FAILED,
     Duration,
     Form,
     Out,
@@ -19,24 +17,18 @@ from ftcc.groundside.cli.common import (
     Settings,
     Strict,
     Variants,
-    judged,
     load_mission,
     scenario_names,
-    show_claims,
-    terminal,
 )
+from ftcc.groundside.cli.flight_output import FlightOutput, JsonOutput, TerminalOutput
 
 if TYPE_CHECKING:
-    from ftcc.groundside.dashboard import Event, Pace
-    from ftcc.groundside.scenario import Mission
-    from ftcc.groundside.swarm import FlightOptions, Outcome
+    from ftcc.groundside.swarm import Outcome
     from ftcc.link.ports import PortBlock
 
 __all__ = ["fly"]
 
 _FLIGHT_FAILED = 1
-
-_COLOURS = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 
 
 def fly(
@@ -75,6 +67,9 @@ def fly(
     id_offset: Annotated[
         int, typer.Option(help="Added to the MAVLink system ids, so that ground stations can tell two swarms apart.")
     ] = 0,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print progress, events and outcome as JSON, an object per line.")
+    ] = False,
     strict: Strict = False,
 ) -> None:
     """Fly a swarm: a vehicle process and an autopilot process per UAV, with MAVLink, mesh and dashboard."""
@@ -97,71 +92,30 @@ def fly(
         key=key,
         id_offset=id_offset,
     )
-    outcome, wall = _fly_on_the_terminal(mission, options, ports)
-    _report(outcome, wall, mission, options.folder, strict)
+    output: FlightOutput = (JsonOutput if json else TerminalOutput)(mission, options)
+    outcome = _fly(output, ports)
+    code = _exit_code(outcome, strict)
+    output.end(outcome, time.monotonic() - output.begun, code)
+    if code:
+        raise typer.Exit(code)
 
 
-def _fly_on_the_terminal(mission: Mission, options: FlightOptions, ports: PortBlock) -> tuple[Outcome, float]:
-    """Fly, with events and progress on the terminal; the outcome, and the wall time of the flight, s."""
+def _fly(output: FlightOutput, ports: PortBlock) -> Outcome:
+    """Fly, with events and progress on standard output."""
     from ftcc.groundside.swarm import fly_swarm
 
-    console = terminal()
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("t = {task.completed:.0f} s"),
-        TextColumn("{task.fields[pace]}"),
-        console=console,
-    )
-    begun = time.monotonic()
-
-    def print_event(event: Event) -> None:
-        who = f"UAV {event.uav}: " if event.uav else ""
-        colour = _COLOURS.get(event.severity, "white")
-        bar.console.print(f"[{colour}]{max(event.t, 0.0):8.2f} s[/]  {who}{escape(event.text)}", soft_wrap=True)
-
-    def show_progress(t: float, pace: Pace) -> None:
-        bar.update(task, completed=t, pace="" if math.isnan(pace.factor) else f"{pace.factor:.2g} x real time")
-
-    def started(address: str | None) -> None:
-        nonlocal begun
-        begun = time.monotonic()
-        bar.update(task, description=f"flying {mission.case}")
-        if address:
-            bar.console.print(f"dashboard: {address}", soft_wrap=True)
-        if options.held:
-            bar.console.print("held at t = 0; start it with `ftcc resume`")
-
-    title = f"[bold]{escape(mission.title)}[/]: {len(mission.vehicles)} UAVs, run {options.folder}"
-    console.print(title, soft_wrap=True)
-    with bar:
-        task = bar.add_task("starting", total=mission.timing.duration, pace="")
+    with output:
         try:
-            outcome = fly_swarm(mission, options, ports, print_event, show_progress, started)
+            return fly_swarm(output.mission, output.options, ports, output.event, output.progress, output.started)
         except TimeoutError as error:
-            console.print(f"[bold red]{escape(str(error))}[/]", soft_wrap=True)
+            output.not_ready(str(error))
             raise typer.Exit(_FLIGHT_FAILED) from error
-    return outcome, time.monotonic() - begun
 
 
-def _report(outcome: Outcome, wall: float, mission: Mission, folder: Path, strict: bool) -> None:
-    """Claims, pace, dead processes and the verdict; exits with code 1 where the flight failed."""
-    console, logs = terminal(), folder / "logs"
-    if outcome.died and not outcome.ticks:
-        died = ", ".join(outcome.died)
-        console.print(f"[bold red]nothing flew: {died} died at the start[/]; see {logs}", soft_wrap=True)
-        raise typer.Exit(_FLIGHT_FAILED)
-    show_claims(folder)
-    share = 100.0 * outcome.late / max(outcome.ticks, 1)
-    flown = outcome.flown * mission.timing.period
-    console.print(
-        f"flew {flown:.1f} s in {wall:.1f} s ({flown / max(wall, 1e-9):.1f} times real time), "
-        f"{outcome.late} of {outcome.ticks} ticks late ({share:.2f} %)"
-    )
-    if not outcome.ok:
-        for name in outcome.died:
-            console.print(f"[bold red]process {name} died[/]; see {logs}", soft_wrap=True)
-    if outcome.verdict is not None:
-        judged(outcome.verdict, strict)
-    if not outcome.ok:
-        raise typer.Exit(_FLIGHT_FAILED)
+def _exit_code(outcome: Outcome, strict: bool) -> int:
+    """Return 1 where a process died or an aircraft was lost, and 3 if ``strict`` and the verdict says failed."""
+    from ftcc.groundside.verdict import FAILED
+
+    if strict and outcome.verdict is not None and outcome.verdict.word == FAILED:
+        return STRICTLY_FAILED
+    return 0 if outcome.ok else _FLIGHT_FAILED

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ftcc.groundside.cli.common import (
+    STRICTLY_FAILED,
     Duration,
     Form,
     Out,
@@ -27,6 +29,8 @@ from ftcc.groundside.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ftcc.groundside.scenario import Mission, Scenario
 
 __all__ = ["check", "list_all", "simulate", "verify"]
@@ -149,6 +153,9 @@ def simulate(
     row: Annotated[
         int | None, typer.Option("--row", metavar="N", help="Fly flight N of a study: its folder, or its scenario.")
     ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print progress, events and outcome as JSON, an object per line.")
+    ] = False,
     strict: Strict = False,
 ) -> None:
     """Fly a scenario in one process, as fast as possible, and record it."""
@@ -161,6 +168,9 @@ def simulate(
     else:
         mission = _mission_of_row(scenario, row, form, variant, settings, seed, duration)
     folder = new_run_folder(mission, out)
+    if json:
+        _simulate_in_lines(mission, folder, strict)
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("t = {task.completed:.0f} s"))
     with Progress(*columns, console=terminal(stderr=True), transient=True) as progress:
         task = progress.add_task("preparing (the first start compiles for half a minute)", total=None)
@@ -182,6 +192,38 @@ def simulate(
     judged(run.verdict, strict)
     if run.lost or run.verdict.flown < mission.timing.duration:
         raise typer.Exit(1)
+
+
+def _simulate_in_lines(mission: Mission, folder: Path, strict: bool) -> None:
+    """Fly and record a mission, and print it as JSON lines; its events follow the flight."""
+    from ftcc.groundside.cli.flight_output import JSON_PERIOD, print_end, print_line, print_start
+    from ftcc.groundside.simulation import simulate as simulate_mission
+    from ftcc.groundside.verdict import FAILED
+
+    begun = last = time.monotonic()
+
+    def ready() -> None:
+        nonlocal begun
+        begun = time.monotonic()
+        print_line("ready")
+
+    def progress(t: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= JSON_PERIOD:
+            last = now
+            print_line("progress", t=t, wall=now - begun)
+
+    print_start(mission, folder)
+    run = simulate_mission(mission, folder, progress, ready)
+    wall = time.monotonic() - begun
+    for event in run.events:
+        print_line("event", **{name: event[name] for name in ("t", "severity", "uav", "text")})
+    incomplete = bool(run.lost) or run.verdict.flown < mission.timing.duration
+    code = STRICTLY_FAILED if strict and run.verdict.word == FAILED else int(incomplete)
+    print_end(folder, run.verdict, run.verdict.flown, wall, code)
+    if code:
+        raise typer.Exit(code)
 
 
 def _mission_of_row(

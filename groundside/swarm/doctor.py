@@ -185,7 +185,7 @@ class _Watch:
         if event.severity == "error" and event.t <= self.duration:
             self.problems.append(event.text.splitlines()[0])
 
-    def on_progress(self, t: float, _pace: Pace) -> None:
+    def on_progress(self, t: float, _pace: Pace, _late: int) -> None:
         """Take a sample at simulated time ``t``; stop the flight after enough of them."""
         now = time.monotonic()
         if self.enough or now - self.begun < _SETTLED:

@@ -83,7 +83,7 @@ def fly_swarm(
     Parameters
     ----------
     report : called with every event.
-    progress : called with the simulated time and the pace, up to ten times per second.
+    progress : called with the simulated time, the pace and the late ticks, up to ten times per second.
     started : called once when all processes are ready, with the viewer's address or None.
 
     Ctrl-C and SIGTERM end the flight in an orderly way.
@@ -215,7 +215,7 @@ def _poll(flight: FlightInProgress, control: ControlSocket | None, progress: Pro
     flight.refresh(progress)
 
 
-def _ignore_progress(_t: float, _pace: Pace) -> None:
+def _ignore_progress(_t: float, _pace: Pace, _late: int) -> None:
     """Do nothing."""
 
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightInProgress", "Progress"]
 
-Progress = Callable[[float, Pace], None]
-"""Called with the current simulated time (s) of a flight, and its pace."""
+Progress = Callable[[float, Pace, int], None]
+"""Called with the current simulated time (s) of a flight, its pace, and the ticks that were late up to now."""
 
 _REFRESH = 0.1
 """Shortest period between updates of the dashboard and of the progress, wall s."""
@@ -90,7 +90,7 @@ class FlightInProgress:
         self.log_scheduled_events()
         if self.swarm.flow.state == "flying" and self.station.t > 0.0:
             self.measure_pace()
-        progress(self.station.t, self.pacing.pace)
+        progress(self.station.t, self.pacing.pace, self.station.late)
         # The first snapshot sets the scale: wait for all UAVs, but no longer than 1 s.
         if not (self.station.complete or self.station.t > 1.0):
             return

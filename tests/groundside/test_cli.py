@@ -206,3 +206,15 @@ def test_bad_input_ends_with_2_and_one_message_on_standard_error(
     assert "Traceback" not in err
     assert out == ""
     assert not (tmp_path / "runs").exists()
+
+
+def test_simulate_prints_json_lines_and_nothing_else(ftcc: Callable[..., Outcome], tmp_path: Path) -> None:
+    code, out, _ = ftcc("simulate", "demo", "--duration", 12, "--json", "--out", tmp_path / "run")
+    lines = [json.loads(line) for line in out.splitlines()]
+    kinds = [line["type"] for line in lines if line["type"] != "progress"]
+    assert kinds == ["start", "ready", "event", "event", "end"]
+    assert lines[-2]["text"] == "verdict: as it should be"
+    end = lines[-1]
+    assert (end["verdict"], end["t"], end["exit_code"], code) == ("as it should be", 12.0, 0, 0)
+    assert [claim["ok"] for claim in end["claims"]] == [True, *[None] * 7]
+    assert end["run"] == str(tmp_path / "run")
