@@ -130,6 +130,7 @@ CHAPTERS = (
             ("flight", "off"),
             ("flight", "rate_100"),
             ("flight", "delay_15"),
+            ("flight", "loss_80"),
             ("flight", "no_lead"),
             ("flight", "travel_30"),
         ),
@@ -142,6 +143,7 @@ CHAPTERS = (
         (
             ("flight", "off"),
             ("flight", "no_observers"),
+            ("flight", "no_networks"),
             ("flight", "alone"),
             ("flight", "undirected"),
             ("flight", "delay_40"),
@@ -155,11 +157,12 @@ CHAPTERS = (
         "four aircraft circle the border of a growing fire",
         (("flight", "ellipse"), ("monograph", "position_errors"), ("flight", "position_errors")),
         (
+            ("monograph", "hz100"),
             ("flight", "off"),
             ("flight", "alone"),
             ("flight", "integer"),
             ("flight", "slow_loop"),
-            ("flight", "slower_load"),
+            ("flight", "loop_1_5"),
             ("flight", "no_model"),
             ("flight", "noise"),
         ),
@@ -272,7 +275,7 @@ def limits_table(chapter: Chapter, folder: Path) -> str:
         held = sum(result.ok is True for result in results)
         claims = f"{held} of {len(results)}" if results else "none made"
         rows.append([f"`{form}`, `{variants}`", changes, outcome_of(run), errors_of(run), claims])
-    return table(("case", "what changes", "verdict", "largest error; in the end", "claims that hold"), rows)
+    return table(("case", "what changes", "verdict", "errors: largest, in the end", "claims that hold"), rows)
 
 
 def outcome_of(run: Run) -> str:
@@ -282,9 +285,11 @@ def outcome_of(run: Run) -> str:
 
 
 def errors_of(run: Run) -> str:
-    """Return the first tracking error that the scheme declares: over the flight, and at its end."""
-    error = run.verdict.tracking[0]
-    return f"{with_unit(error.largest, error.unit)}; {with_unit(error.end, error.unit)}"
+    """Return the largest value of every tracking error that the scheme declares, and that in the end."""
+    return "; ".join(
+        f"{error.name}: {with_unit(error.largest, error.unit)}, {with_unit(error.end, error.unit)}"
+        for error in run.verdict.tracking
+    )
 
 
 def flown(mission: Mission, run: Run) -> Flown:
