@@ -54,6 +54,8 @@ class Autopilots(NamedTuple):
     """(k, n): the scheme's ``Output`` of the last step."""
     started: NDArray[np.int64]
     """(k,): 1 once the law has its initial state."""
+    stepping: NDArray[np.int64]
+    """(1,): whose law was called last."""
     gains: NDArray[np.float64]
     """(k, n): the scheme's ``Gains``."""
     model: NDArray[np.float64]
@@ -189,6 +191,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         state=np.zeros((k, width(scheme.module.State))),
         output=np.zeros((k, width(scheme.module.Output))),
         started=np.zeros(k, np.int64),
+        stepping=np.zeros(1, np.int64),
         gains=np.array([spec.gains for spec in specs], np.float64),
         model=np.array([spec.model for spec in specs], np.float64),
         weight=weight,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import sys
 from types import ModuleType
 
 from ftcc.airside.autopilots import build
 from ftcc.airside.diagnosis import active as active_tolerance
 from ftcc.airside.diagnosis import passive as passive_tolerance
 from ftcc.airside.diagnosis.gains import DiagnosisGains
+from ftcc.airside.law_errors import describe_left_out, package_of
 from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.airside.schemes import find
@@ -21,12 +21,16 @@ from ftcc.link.timing import Timing
 
 __all__ = ["flight_of", "placeholder", "stages_of"]
 
+_SLOWLY = "slowly"
+_HOW = "compiled laws fly faster: docs/tutorials/own-law.md"
+
 
 @functools.cache
 def stages_of(name: str, active: bool = False) -> ModuleType:
     """The stages of a tick under a scheme, by its name, with active fault tolerance or without, see `stages`.
 
-    They are compiled, or, where numba cannot compile the scheme, plain Python: then their ``REFUSAL`` says why.
+    They are compiled, or, where the scheme is not or numba cannot compile it, plain Python: then their ``REFUSAL`` says
+    why.
     """
     scheme = find(name)
     stages = instantiate(
@@ -37,10 +41,12 @@ def stages_of(name: str, active: bool = False) -> ModuleType:
         tolerance=active_tolerance if active else passive_tolerance,
     )
     autopilots, inbox = build([placeholder(name, active)], Timing(1, 1, 1, 1, 1, 1, 1))
-    because = refusal(stages.control, autopilots, inbox, 0, 0.01)
+    lacking = describe_left_out(scheme.module)
+    because = lacking or refusal(stages.control, autopilots, inbox, 0, 0.01)
     if because:
-        stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, slowly: numba cannot compile it ({because})"
-        uncompile([stages, *_with_its_package(scheme.module)])
+        why = f"{'it is not compiled' if lacking else 'numba cannot compile it'} ({because}); {_HOW}"
+        stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, {_SLOWLY}: {why}"
+        uncompile([stages, *package_of(scheme.module)])
     return stages
 
 
@@ -56,14 +62,6 @@ def flight_of(name: str, active: bool = False) -> ModuleType:
 
 def _instance(name: str, active: bool) -> str:
     return f"{name},active" if active else name
-
-
-def _with_its_package(scheme: ModuleType) -> list[ModuleType]:
-    """A scheme's file, and, if it comes from another package than this one, what else of that is loaded."""
-    package, own = scheme.__name__.split(".")[0], __name__.split(".")[0]
-    if package == own:
-        return [scheme]
-    return [module for name, module in sys.modules.items() if name == package or name.startswith(f"{package}.")]
 
 
 def placeholder(name: str, active: bool = False) -> AutopilotSpec:

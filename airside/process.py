@@ -17,13 +17,14 @@ from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.compiled_stages import flight_of, stages_of
 from ftcc.airside.gcs import AutopilotView, GcsLink
 from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE, AutopilotGroup, build_group
+from ftcc.airside.law_errors import describe_error, describe_not_finite
 from ftcc.airside.leader import drain_leader_events
 from ftcc.airside.neighbourhood import Neighbourhood
 from ftcc.airside.scheme import Quantity
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, is_active
 from ftcc.link.compiled import entry_of
-from ftcc.link.gate import Ended, EventReport, Gate, Ready
+from ftcc.link.gate import Ended, EventReport, Gate, LawFailed, Ready
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint, ending_message, ends
 from ftcc.link.process import Setting, Stall, Waiter
 from ftcc.link.recording import LINK_COLUMNS, Column, Recorder, part_path
@@ -56,7 +57,10 @@ def main(specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
         process.wait_for_neighbours()
         gate.report(Ready())
         gate.wait_until_go()
-        process.fly()
+        try:
+            process.fly()
+        except Exception as error:
+            process.report_law_error(error)
     finally:
         process.close()
 
@@ -194,6 +198,15 @@ class AutopilotProcess:
         """Look after the next tick what is due."""
         self.group.telemetry_us[0], self.group.telemetry_wall[0] = 0, 0.0
 
+    def report_law_error(self, error: Exception) -> None:
+        """Report an error that the law raised, and end; any other error goes on."""
+        text = describe_error(error, find(self.specs[0].scheme), self.group.autopilots, self.specs)
+        if not text:
+            raise error
+        i = int(self.group.autopilots.stepping[0])
+        self.gate.report(LawFailed(text, self.specs[i].uav, int(self.group.done[i]) * self.timing.period_us))
+        self.end()
+
     def end_lost(self) -> None:
         """End the UAVs whose law gave no finite command, and send their vehicles word of it."""
         if self.group.unsendable[0]:
@@ -201,6 +214,9 @@ class AutopilotProcess:
         self.group.lost[0] = 0
         for i, link in enumerate(self.gcs_links):
             if not self.group.alive[i] and link.view.alive:
+                text = describe_not_finite(link.view.scheme, self.group.autopilots, i)
+                at_us = int(self.group.done[i]) * self.timing.period_us
+                self.gate.report(EventReport("error", text, self.specs[i].uav, at_us))
                 keep_sent(self.group.wire, i, self.vehicles[i].pack(ending_message()))
                 send_again(self.group.wire, i)
                 link.end()

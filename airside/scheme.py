@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
 import math
 import re
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType, ModuleType
@@ -14,6 +16,7 @@ from typing import Any, Literal, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.law_checks import find_mistakes, shown_path, similar
 from ftcc.airside.ranges import Range
 from ftcc.airside.references.longitudinal import Reference
 from ftcc.link.compiled import width
@@ -22,6 +25,8 @@ from ftcc.link.graph import Assumption, Graph
 __all__ = [
     "FAULT_TOLERANCE",
     "FOLLOWED",
+    "LARGEST_COMMAND",
+    "LARGEST_STATE",
     "Flight",
     "Heard",
     "Problem",
@@ -74,6 +79,13 @@ _ROLE_WORDS: dict[Role, str] = {
     "reference": r"^reference,",
 }
 """By role, the words in a meaning that stand for it where none is declared; the first that fits."""
+
+LARGEST_COMMAND, LARGEST_STATE = 1e30, 1e12
+"""Beyond these a command or shared value, and a state of a law, count as not finite.
+
+A larger command would not fit a float32 as a fraction of its travel. No quantity of an aircraft is as large as such a
+state: it grows without end, and is reported before it is inf.
+"""
 
 FOLLOWED = {"leaders.z": "mean altitude of the leaders at the start, m"}
 """What gains may follow."""
@@ -172,9 +184,8 @@ class Scheme:
                 raise SchemeError(
                     f"scheme {self.name}: states or outputs hold vectors; say with SIGNALS what is recorded"
                 )
-        strange = [name for name in self.ranges if name not in self.gains_type._fields]
-        if strange:
-            raise SchemeError(f"scheme {self.name}: RANGES name {', '.join(strange)}, which are no gains")
+        if mistakes := find_mistakes(self.module, Heard):
+            raise SchemeError("; ".join(mistakes))
 
     def _require_quantities(self, kind: str, record: Any, names: Sequence[str]) -> None:
         missing = [name for name in names if name not in quantities(record)]
@@ -310,7 +321,7 @@ class Scheme:
                 values[name] = followed[note.follows]
         for name, value in overrides.items():
             if name not in known:
-                raise ValueError(f"scheme {self.name} has no gain {name!r}; it has {', '.join(known)}")
+                raise ValueError(f"scheme {self.name} has no gain {name!r}; {similar(name, known)}")
             if not math.isfinite(value):
                 raise ValueError(f"gain {name} = {value}: must be a finite number")
             values[name] = value
@@ -321,5 +332,27 @@ class Scheme:
 
 
 def load(name: str, module: str) -> Scheme:
-    """Import a scheme's module and check it."""
-    return Scheme(name, importlib.import_module(module))
+    """Import a scheme's module and check it.
+
+    Raises
+    ------
+    SchemeError
+        With file and line where it cannot be imported, or with what it lacks.
+    """
+    try:
+        imported = importlib.import_module(module)
+    except SyntaxError as error:
+        raise SchemeError(f"{shown_path(error.filename or module)}:{error.lineno}: {error.msg}") from None
+    except Exception as error:
+        raise SchemeError(f"{_place_of_import_error(error, module)}: {type(error).__name__}: {error}") from error
+    return Scheme(name, imported)
+
+
+def _place_of_import_error(error: Exception, module: str) -> str:
+    """Where a module that was imported raised an error: the last of its own lines."""
+    spec = importlib.util.find_spec(module) if "." not in module else None
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if spec is not None and frame.filename == spec.origin]
+    if not own:
+        own = [frame for frame in frames if "importlib" not in frame.filename and frame.filename != __file__]
+    return f"{shown_path(own[-1].filename)}:{own[-1].lineno}" if own else f"module {module}"

@@ -16,7 +16,7 @@ from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.leader import advance_leader
 from ftcc.airside.model import Model
-from ftcc.airside.scheme import Heard
+from ftcc.airside.scheme import LARGEST_COMMAND, LARGEST_STATE, Heard
 from ftcc.link.actuators import decode_command
 from ftcc.link.channel import hear as hear_inbox
 from ftcc.link.compiled import compiled, compiled_within, copy, fields, store, width
@@ -54,6 +54,7 @@ _share = scheme.share
 _Reference = references.Reference
 _refer = references.refer
 _STATES = width(_State)
+_SHARED = len(scheme.SHARED.get("follower", ()))
 _stand = references.stand
 _COMMANDS = len(scheme.COMMANDS)
 _command_for = tolerance.command_for
@@ -77,8 +78,14 @@ SWEEPS: int = getattr(scheme, "SWEEPS", 1)
 
 _DOWN = StateMessage._fields.index("z")
 
-_LARGEST = 1e30
-"""Beyond this a command counts as not finite: it would not fit a float32 as a fraction of its travel."""
+
+@compiled
+def _is_finite(values, count, largest):
+    """Whether the first ``count`` numbers are finite and smaller than ``largest``."""
+    for n in range(count):
+        if not abs(values[n]) < largest:
+            return False
+    return True
 
 
 @compiled_within
@@ -161,6 +168,7 @@ def refer(autopilots, inbox, i, now_us, period_us):
 @compiled
 def set_shared(autopilots, inbox, i):
     """Set ``shared`` from the state at this instant, before the law's step, for an ideal exchange."""
+    autopilots.stepping[0] = i
     own = fields(Own, autopilots.own[i])
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
@@ -172,6 +180,7 @@ def set_shared(autopilots, inbox, i):
 @compiled
 def predict_shared(autopilots, inbox, i, dt):
     """Set ``shared`` to what UAV ``i`` would share of this instant given what it has heard; no state advances."""
+    autopilots.stepping[0] = i
     own = fields(Own, autopilots.own[i])
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
@@ -186,8 +195,9 @@ def control(autopilots, inbox, i, dt):
     """Step the law of follower ``i``: sets state, command, shared values and signals.
 
     Shared values and signals belong to the instant of the measurement. Returns False, and leaves the command as it was,
-    if the law gives a command that is not finite.
+    if the law gives a command, a state or a value to share that is not finite.
     """
+    autopilots.stepping[0] = i
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     own, model = _given_to_law(autopilots, i)
@@ -196,11 +206,15 @@ def control(autopilots, inbox, i, dt):
     after, output = _step(before, own, _heard_by(autopilots, inbox, i), reference, model, gains, dt)
     shown = autopilots.output[i]
     store(output, shown)
-    for n in range(_COMMANDS):
-        if not abs(shown[n]) < _LARGEST:
-            return False
+    if not _is_finite(shown, _COMMANDS, LARGEST_COMMAND):
+        return False
     store(after, autopilots.state[i])
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
+    if not (
+        _is_finite(autopilots.state[i], _STATES, LARGEST_STATE)
+        and _is_finite(autopilots.shared[i], _SHARED, LARGEST_COMMAND)
+    ):
+        return False
     _set_signals(autopilots, i, before, own, reference, output, gains)
     for n in range(_COMMANDS):
         slot = autopilots.actuator[n]

@@ -12,6 +12,7 @@ import importlib.util
 import itertools
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,6 +40,8 @@ __all__ = [
     "fields",
     "fill",
     "instantiate",
+    "is_left_out",
+    "layout",
     "moved",
     "refusal",
     "store",
@@ -188,13 +191,30 @@ def refusal(function: Any, *arguments: Any) -> str:
     return ""
 
 
+def is_left_out(function: Any) -> bool:
+    """Whether ``function`` is plain Python where others are compiled, so that these cannot call it."""
+    return not numba.config.DISABLE_JIT and not isinstance(function, Dispatcher)
+
+
+_MAKES_ARRAY = re.compile(
+    r"\w*(zeros|ones|empty|full|array|arange|linspace|eye|identity|stack|concatenate|copy|diag|outer|dot|where)\w*\("
+)
+"""A call in numba's words that makes an array."""
+_PLACE = re.compile(r'File "([^"]+)", line (\d+)')
+
+
 def _reason(text: str) -> str:
-    """The useful part of numba's message: the innermost problem, and the first place outside numba that it names."""
+    """What numba's message says: the first place outside numba that it names, and the innermost problem there."""
     lines = [line.strip() for line in text.splitlines()]
     first, *more = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))] or [""]
-    places = [line for line in lines if line.startswith("File ") and "/numba/" not in line]
-    shown = [first, *(line for line in more[:2] if line.startswith(">>>")), *places[:1]]
-    return "; ".join(line.rstrip(":") for line in shown)
+    call = next((line.removeprefix(">>>").strip() for line in more[:2] if line.startswith(">>>")), "")
+    place = next((found for line in lines if "/numba/" not in line and (found := _PLACE.match(line))), None)
+    where = f"{place[1]}:{place[2]}: " if place else ""
+    if _MAKES_ARRAY.match(call) or "array(" in call:
+        return f"{where}{call} makes an array, and compiled code may make none"
+    if name := re.match(r"Untyped global name '(\w+)'.*<class 'function'>", first):
+        return f"{where}{name[1]} is not @compiled, so compiled code cannot call it"
+    return where + "; ".join(filter(None, (first.rstrip(":"), call)))
 
 
 def uncompile(modules: Sequence[ModuleType]) -> None:
@@ -222,10 +242,10 @@ class Room:
 
 
 @functools.cache
-def _layout(cls: Any) -> tuple[tuple[int, int, int | Room], ...]:
+def layout(cls: Any) -> tuple[tuple[int, int, int | Room], ...]:
     """First entry, end, and number of floats (or `Room`) of each field of a NamedTuple class in a vector."""
     hints = get_type_hints(cls, include_extras=True)
-    layout: list[tuple[int, int, int | Room]] = []
+    found: list[tuple[int, int, int | Room]] = []
     at = 0
     for name in cls._fields:
         hint = hints[name]
@@ -233,14 +253,14 @@ def _layout(cls: Any) -> tuple[tuple[int, int, int | Room], ...]:
         parts = get_args(hint.__origin__ if hasattr(hint, "__metadata__") else hint)
         what = rooms[0] if rooms else max(1, len(parts))
         end = at + (what.size if isinstance(what, Room) else what)
-        layout.append((at, end, what))
+        found.append((at, end, what))
         at = end
-    return tuple(layout)
+    return tuple(found)
 
 
 def width(cls: Any) -> int:
     """How many floats a NamedTuple class takes in a vector."""
-    return _layout(cls)[-1][1]
+    return layout(cls)[-1][1]
 
 
 def fields(cls: Any, values: Any) -> Any:
@@ -251,7 +271,7 @@ def fields(cls: Any, values: Any) -> Any:
     if width(cls) == len(cls._fields):
         return cls(*values[: len(cls._fields)].tolist())
     made: list[Any] = []
-    for at, end, what in _layout(cls):
+    for at, end, what in layout(cls):
         entries = values[at:end]
         if isinstance(what, Room):
             made.append(entries.reshape(what.shape))
@@ -267,7 +287,7 @@ def _fields_compiled(cls, values):
     kind: Any = cls.instance_class
     # Entry by entry: to_fixed_tuple takes 10 ns for each.
     made = []
-    for at, end, what in _layout(kind):
+    for at, end, what in layout(kind):
         if isinstance(what, Room):
             made.append(f"values[{at}:{end}].reshape({what.shape})" if len(what.shape) > 1 else f"values[{at}:{end}]")
         else:
@@ -280,7 +300,7 @@ def _rooms(record_type: Any) -> dict[int, int]:
     """Sizes of the arrays among the fields of a tuple type, by place."""
     if not hasattr(record_type, "_fields"):
         return {}
-    return {n: what.size for n, (_, _, what) in enumerate(_layout(record_type)) if isinstance(what, Room)}
+    return {n: what.size for n, (_, _, what) in enumerate(layout(record_type)) if isinstance(what, Room)}
 
 
 def store(record: Any, values: Any) -> None:

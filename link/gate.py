@@ -19,6 +19,7 @@ __all__ = [
     "Gone",
     "Held",
     "LauncherGoneError",
+    "LawFailed",
     "Limit",
     "Lost",
     "Pace",
@@ -73,6 +74,17 @@ class EventReport:
     """The sender of the request that caused it, as "system/component"; empty without one."""
     outcome: str = ""
     """The answer to that request, such as "accepted" or "denied"."""
+
+
+@dataclass(frozen=True)
+class LawFailed:
+    """Autopilot -> launcher: the control law raised an error; the flight cannot go on."""
+
+    text: str
+    """File, line, error, UAV and time."""
+    uav: int
+    at_us: int
+    """Simulated time, us."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ TRUTH = tuple(UNITS)
 X, Y, Z, V, GAMMA, CHI, MU, ALPHA, BETA, THETA, P, Q, R = range(len(TRUTH))
 
 DIVERGED = 5
-"""Key of `LOST`: the law's command is not finite."""
+"""Key of `LOST`: a command, state or shared value of the law is not finite."""
 
 AIRSPEED, CLIMB, INCIDENCE, NUMBER, SIDESLIP = 1, 2, 3, 4, 6
 """Keys of `LOST` that a plant's ``lost`` returns."""
@@ -32,7 +32,7 @@ LOST = {
     CLIMB: "flight-path angle outside the model's valid range",
     INCIDENCE: "angle of attack outside the model's valid range",
     NUMBER: "state is not a number",
-    DIVERGED: "control law gave a command that is not a number",
+    DIVERGED: "control law gave a number that is not finite",
     SIDESLIP: "sideslip outside the model's valid range",
 }
 """Why a vehicle ended, by code."""

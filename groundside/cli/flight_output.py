@@ -127,6 +127,8 @@ class TerminalOutput(FlightOutput):
 
     def end(self, outcome: Outcome, wall: float, code: int) -> None:
         console, logs = self._console, self.options.folder / "logs"
+        if outcome.law_error:
+            return  # It was shown as an event.
         if outcome.died and not outcome.ticks:
             died = ", ".join(outcome.died)
             console.print(f"[bold red]nothing flew: {died} died at the start[/]; see {logs}", soft_wrap=True)

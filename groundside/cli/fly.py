@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["fly"]
 
 _FLIGHT_FAILED = 1
+_MISTAKE = 2
+"""As of other bad input."""
 
 
 def fly(
@@ -113,9 +115,11 @@ def _fly(output: FlightOutput, ports: PortBlock) -> Outcome:
 
 
 def _exit_code(outcome: Outcome, strict: bool) -> int:
-    """Return 1 where a process died or an aircraft was lost, and 3 if ``strict`` and the verdict says failed."""
+    """Return 2 where the law is wrong, 1 where a process died or an aircraft was lost, 3 if ``strict`` and it failed."""
     from ftcc.groundside.verdict import FAILED
 
+    if outcome.law_error:
+        return _MISTAKE
     if strict and outcome.verdict is not None and outcome.verdict.word == FAILED:
         return STRICTLY_FAILED
     return 0 if outcome.ok else _FLIGHT_FAILED

@@ -31,6 +31,7 @@ from ftcc.groundside.cli.common import (
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from ftcc.groundside.results import Run
     from ftcc.groundside.scenario import Mission, Scenario
 
 __all__ = ["check", "list_all", "simulate", "verify"]
@@ -188,6 +189,7 @@ def simulate(
             run = simulate_mission(mission, folder, lambda t: progress.update(task, completed=t), ready)
         finally:
             compiling.cancel()
+    _show_errors(run)
     show_summary(folder, run.claims())
     judged(run.verdict, strict)
     if run.lost or run.verdict.flown < mission.timing.duration:
@@ -224,6 +226,17 @@ def _simulate_in_lines(mission: Mission, folder: Path, strict: bool) -> None:
     print_end(folder, run.verdict, run.verdict.flown, wall, code)
     if code:
         raise typer.Exit(code)
+
+
+def _show_errors(run: Run) -> None:
+    """Print what went wrong with UAVs beside the losses, which the verdict names."""
+    from ftcc.link.recording import AIRCRAFT_LOST
+
+    out = terminal(stderr=True)
+    for event in run.events:
+        if event["severity"] == "error" and event.get("uav") and not event["text"].startswith(AIRCRAFT_LOST):
+            text = f"{event['t']:8.2f} s  UAV {event['uav']}: {event['text']}"
+            out.print(text, style="bold red", markup=False, highlight=False, soft_wrap=not out.is_terminal)
 
 
 def _mission_of_row(

@@ -4,6 +4,7 @@ from .cases import load_case as load_case
 from .columns import NotRecordedError as NotRecordedError
 from .columns import columns_needed as columns_needed
 from .flight import Flight as Flight
+from .one_process import LawError as LawError
 from .one_process import PlainPython as PlainPython
 from .one_process import fly_in_memory as fly_in_memory
 from .simulating import simulate as simulate

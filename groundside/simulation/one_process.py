@@ -18,8 +18,10 @@ import numpy as np
 import psutil  # type: ignore[import-untyped]
 
 from ftcc.airside.compiled_stages import stages_of
+from ftcc.airside.law_errors import describe_error, describe_not_finite
 from ftcc.airside.leader import drain_leader_events
 from ftcc.airside.spec import is_active
+from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.columns import places_kept
 from ftcc.groundside.simulation.flight import Flight
@@ -27,10 +29,10 @@ from ftcc.groundside.simulation.space import recording_size, require_space
 from ftcc.link.compiled import entry_of, instantiate, uncompile
 from ftcc.link.events import drain_events
 from ftcc.sim.obstacles import entered_text
-from ftcc.sim.plant import LOST
+from ftcc.sim.plant import DIVERGED, LOST
 from ftcc.sim.plants import conditions_of, cycle_of
 
-__all__ = ["PlainPython", "Progress", "defer_interrupt", "fly_in_memory", "fly_in_parts", "loop_of"]
+__all__ = ["LawError", "PlainPython", "Progress", "defer_interrupt", "fly_in_memory", "fly_in_parts", "loop_of"]
 
 _CHUNKS = 100
 """Number of pieces of a flight; progress is reported and Ctrl-C takes effect between them."""
@@ -39,7 +41,11 @@ Progress = Callable[[float], None]
 
 
 class PlainPython(UserWarning):
-    """A scheme flies as plain Python because numba cannot compile it."""
+    """A scheme flies as plain Python because it is not compiled, or numba cannot compile it."""
+
+
+class LawError(UserError):
+    """A control law raised an error in flight; the text says in which file and line, of which UAV, and when."""
 
 
 def loop_of(scheme: str, plant: str, active: bool = False) -> ModuleType:
@@ -78,7 +84,7 @@ def fly_in_memory(
     TooLargeError
         If the recording does not fit into memory.
     UserError
-        If the mission has no such column.
+        If the mission has no such column, or, as `LawError`, if the law raises an error.
     """
     # Results that are computed from it need the same space again.
     require_space(mission, 2 * recording_size(mission, columns)[1], psutil.virtual_memory().available / 1e9, "memory")
@@ -96,8 +102,6 @@ def fly_in_parts(
     """Fly a mission; pass the recording of every ``room`` ticks to ``take``, and return the last part."""
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant, is_active(mission.autopilots))
-    if loop.stages.REFUSAL:
-        warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
     kept = list(places_kept(mission, columns).values())
     world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
     flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording)
@@ -110,6 +114,7 @@ def fly_in_parts(
     flown = taken = 0
     interrupted = False
     events: list[tuple[float, int, str, str]] = []
+    diverged: set[int] = set()
     while flown < end and not interrupted:
         try:
             if flown == taken + room:
@@ -117,12 +122,20 @@ def fly_in_parts(
                     take(flight_so_far(taken, flown, events))
                     taken = flown
                     world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
-            until = min(end, flown + chunk, taken + room)
+            # A law that has just been written fails at the first tick, if ever: then that is all there is to say of it.
+            until = min(end, flown + chunk, taken + room) if flown else 1
             fly_ticks(world, timing, mission.wire, flown, until)
+            if not flown and loop.stages.REFUSAL:
+                warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
             events += _drain_all_events(mission, world.fleet, world.autopilots)
+            events += _describe_divergence(mission, world, diverged)
             flown = until
             if progress is not None:
                 progress((flown - 1) * timing.period)
+        except Exception as error:
+            if text := describe_error(error, mission.scheme, world.autopilots, mission.autopilots):
+                raise LawError(text) from error
+            raise
         except KeyboardInterrupt:
             # The flight so far is recorded, and its verdict says that it ended early.
             interrupted = True
@@ -179,6 +192,17 @@ def _flight_so_far(
         first_report=report,
         columns=None if columns is None else frozenset(columns),
     )
+
+
+def _describe_divergence(mission: Mission, world: Any, known: set[int]) -> list[tuple[float, int, str, str]]:
+    """Return events of UAVs whose law has diverged since the last call, which ``known`` holds: which number did."""
+    events = []
+    for i in map(int, np.flatnonzero(world.recording.lost == DIVERGED)):
+        if i not in known:
+            known.add(i)
+            text = describe_not_finite(mission.scheme, world.autopilots, i)
+            events.append((float(world.recording.lost_us[i]) / 1e6, mission.uavs[i], "error", text))
+    return events
 
 
 def _drain_all_events(mission: Mission, fleet: Any, autopilots: Any) -> list[tuple[float, int, str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import overload
@@ -9,7 +10,7 @@ from typing import overload
 from ftcc.groundside.results import Run, RunError, reserved_folder
 from ftcc.groundside.scenario import Mission, Scenario, Settings, mission_of
 from ftcc.groundside.simulation.flight import Flight
-from ftcc.groundside.simulation.one_process import Progress, fly_in_memory
+from ftcc.groundside.simulation.one_process import LawError, Progress, fly_in_memory
 from ftcc.groundside.simulation.to_disk import fly_to_disk
 
 __all__ = ["simulate"]
@@ -88,6 +89,8 @@ def simulate(
         If the recording does not fit into memory or on the disk.
     RunError, BusyFolderError
         If ``folder`` holds a run or a study, cannot be written, or another process writes there.
+    LawError
+        If the law raises an error in flight; nothing is left of it in ``folder``.
     KeyboardInterrupt
         On Ctrl-C in a flight in memory.
     """
@@ -97,13 +100,18 @@ def simulate(
         if _ended_early(flight):
             raise KeyboardInterrupt
         return flight
-    with reserved_folder(folder) as path:
-        try:
-            return fly_to_disk(mission, path, progress, ready)
-        except OSError as error:
-            raise RunError(
-                f"{path}: cannot be written: {error.strerror or error}; free some space, or give --out"
-            ) from None
+    try:
+        with reserved_folder(folder) as path:
+            try:
+                return fly_to_disk(mission, path, progress, ready)
+            except OSError as error:
+                raise RunError(
+                    f"{path}: cannot be written: {error.strerror or error}; free some space, or give --out"
+                ) from None
+    except LawError:
+        with contextlib.suppress(OSError):
+            Path(folder).rmdir()
+        raise
 
 
 def _ended_early(flight: Flight) -> bool:

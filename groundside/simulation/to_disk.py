@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
@@ -14,7 +14,7 @@ from ftcc.airside.spec import is_active
 from ftcc.groundside.results import Run, TableWriter
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.flight import Flight, recorded_columns
-from ftcc.groundside.simulation.one_process import Progress, defer_interrupt, fly_in_parts
+from ftcc.groundside.simulation.one_process import LawError, Progress, defer_interrupt, fly_in_parts
 from ftcc.groundside.simulation.space import recording_size, require_space
 from ftcc.groundside.verdict import VERDICT_FILE, judge
 from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, EventLog
@@ -47,6 +47,7 @@ def fly_to_disk(
     timing = mission.timing
     last = 0.0
     with (
+        _nothing_left_of_an_error(folder),
         TableWriter(folder / "signals.parquet", recorded_columns(mission)) as signals,
         TableWriter(folder / "links.parquet", LINK_COLUMNS) as links,
     ):
@@ -62,6 +63,17 @@ def fly_to_disk(
         with contextlib.suppress(KeyboardInterrupt), defer_interrupt():
             take(rest)
     return _conclude(mission, folder, last, rest)
+
+
+@contextlib.contextmanager
+def _nothing_left_of_an_error(folder: Path) -> Iterator[None]:
+    """Remove what was recorded of a flight whose law raised an error: it is no run."""
+    try:
+        yield
+    except LawError:
+        for name in ("signals.parquet", "links.parquet"):
+            (folder / name).unlink(missing_ok=True)
+        raise
 
 
 def _conclude(mission: Mission, folder: Path, last: float, flight: Flight) -> Run:

@@ -12,7 +12,7 @@ from typing import Any
 from ftcc.groundside.claims import evaluate, tolerance_of
 from ftcc.groundside.results import Run
 from ftcc.groundside.scenario import Mission
-from ftcc.groundside.simulation import Flight, columns_needed, fly_in_memory, simulate
+from ftcc.groundside.simulation import Flight, LawError, columns_needed, fly_in_memory, simulate
 from ftcc.groundside.studies.diagnosed import diagnosed
 from ftcc.groundside.studies.plan import StudyPlan
 from ftcc.groundside.verdict import Verdict, columns_diagnosed
@@ -102,6 +102,8 @@ def fly_trial(
         outcome = _flown(plan, number, mission, record_in, progress)
     except InterruptedError:
         raise
+    except LawError as error:
+        return Outcome(number, drawn, error=str(error), wall=time.perf_counter() - begun)
     except Exception as error:  # a failed flight is a row of the table and must not end the study
         where = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"

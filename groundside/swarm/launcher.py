@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ftcc.groundside.dashboard import Event
 from ftcc.groundside.swarm.flow import Flow
 from ftcc.groundside.swarm.preloading import ACTIVE_VARIABLE, PLANT_VARIABLE, SCHEME_VARIABLE
-from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, Lost, Ready, Release, Stop
+from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, LawFailed, Lost, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting, process_main
 from ftcc.link.recording import AIRCRAFT_LOST
@@ -82,6 +82,8 @@ class Outcome:
     """Names of processes that died."""
     lost: dict[int, str] = field(default_factory=dict)
     """UAVs whose aircraft was lost, with the reason."""
+    law_error: str = ""
+    """The error that the control law raised, with file and line; empty: none."""
     late: int = 0
     ticks: int = 0
     """Ticks flown by all vehicles together."""
@@ -94,8 +96,8 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Return whether no process died and no aircraft was lost."""
-        return not self.died and not self.lost
+        """Return whether no process died, no aircraft was lost and the law raised no error."""
+        return not (self.died or self.lost or self.law_error)
 
 
 _main_module_lock = threading.Lock()
@@ -307,6 +309,11 @@ class SwarmProcesses:
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
+            case LawFailed(text, uav, at_us):
+                if not self.outcome.law_error:
+                    self.outcome.law_error = text
+                    self.on_event(Event(at_us / 1e6, "error", text, uav))
+                self.stop()
             case EventReport(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 

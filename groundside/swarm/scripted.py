@@ -104,6 +104,7 @@ class Swarm(Commanding):
         self._error: BaseException | None = None
         self._reported: set[str] = set()
         """Processes that died, and of which an error has said so."""
+        self._reported_law_error = False
         self._control: Control | None = None
         self._station: Station | None = None
 
@@ -186,6 +187,9 @@ class Swarm(Commanding):
         if self._error is not None:
             raise self._error
         if self._outcome is not None:
+            if self._outcome.law_error and not self._reported_law_error:
+                self._reported_law_error = True
+                raise SwarmError(self._outcome.law_error)
             self._look({"died": self._outcome.died})
 
     def _look(self, status: dict[str, Any]) -> None:
