@@ -94,7 +94,7 @@ def _names_of_gains(module: ModuleType) -> Iterator[str]:
 
 
 def _sets(module: ModuleType, kind: str) -> Iterable[tuple[str, Any]]:
-    return getattr(module, kind, {}).items()  # type: ignore[no-any-return]
+    return getattr(module, kind, {}).items()
 
 
 def _commands(module: ModuleType) -> Iterator[str]:

@@ -16,7 +16,7 @@ from ftcc.airside.scheme import LARGEST_COMMAND, LARGEST_STATE, Scheme
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import is_left_out, layout
 
-__all__ = ["describe_error", "describe_not_finite", "describe_left_out", "package_of"]
+__all__ = ["describe_error", "describe_left_out", "describe_not_finite", "package_of"]
 
 _PYTHONS = (TypeError, AttributeError, NameError, IndexError, KeyError, ValueError, ZeroDivisionError, OverflowError)
 """Errors whose text says what is wrong without the name of their class."""

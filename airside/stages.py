@@ -82,7 +82,7 @@ _DOWN = StateMessage._fields.index("z")
 @compiled
 def _is_finite(values, count, largest):
     """Whether the first ``count`` numbers are finite and smaller than ``largest``."""
-    for n in range(count):
+    for n in range(count):  # noqa: SIM110 (compiled)
         if not abs(values[n]) < largest:
             return False
     return True

@@ -1,6 +1,7 @@
 """The cache on disk, from one start to the next: compiled functions, and results that take long to compute.
 
-It lies in a folder named by the hash of all sources that it may depend on: an edit anywhere begins a new one. This
+It lies in a folder named by the hash of all sources that it may depend on: an edit anywhere begins a new one. What is
+compiled of a law from another package lies in a folder of its own: an edit there compiles this law alone again. This
 module imports neither numba nor numpy, so that kept results are read without them.
 """
 
@@ -19,14 +20,14 @@ import shutil
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ftcc.link.folders import cache_folder
 
-__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "kept", "not_kept"]
+__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "guest_folder", "kept", "not_kept"]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -95,10 +96,15 @@ def _holder(file: Any) -> str:
     return file.read() or "(unknown)"
 
 
-def _source_files() -> list[Path]:
-    """Every file whose compiled functions can become part of those of another file."""
+def _own_files() -> list[Path]:
+    """Every file of ours whose compiled functions can become part of those of another file."""
     root = Path(__file__).resolve().parent.parent
-    found = [path for package in _PACKAGES for path in (root / package).rglob("*.py")]
+    return sorted(path for package in _PACKAGES for path in (root / package).rglob("*.py"))
+
+
+def _guest_files() -> list[Path]:
+    """Every file of the packages that offer schemes."""
+    found: list[Path] = []
     for entry in importlib.metadata.entry_points(group=SCHEME_ENTRY_POINTS):
         spec = importlib.util.find_spec(entry.module.split(".")[0])
         for place in (spec.submodule_search_locations or []) if spec else []:
@@ -112,11 +118,21 @@ def _source_files() -> list[Path]:
 def folder() -> Path:
     """The folder of this version of the program; removes the folders of all but its last few versions."""
     versions = [sys.version, *(importlib.metadata.version(name) for name in _LIBRARIES)]
-    digest = hashlib.sha256(" ".join(versions).encode())
-    for path in _source_files():
+    return _folder_of("compiled", " ".join(versions), _own_files())
+
+
+@functools.cache
+def guest_folder() -> Path:
+    """The folder of this version of the program and of the packages that offer schemes; as `folder`."""
+    return _folder_of("laws", folder().name, _guest_files())
+
+
+def _folder_of(kind: str, versions: str, files: Sequence[Path]) -> Path:
+    digest = hashlib.sha256(versions.encode())
+    for path in files:
         digest.update(str(path).encode())
         digest.update(path.read_bytes())
-    own = cache_folder(f"compiled/{digest.hexdigest()[:_DIGITS]}")
+    own = cache_folder(f"{kind}/{digest.hexdigest()[:_DIGITS]}")
     # Other processes remove folders at the same time, and what lies there may be another user's.
     with contextlib.suppress(OSError):
         os.utime(own)

@@ -2,7 +2,8 @@
 
 numba's own cache looks only at the file of the calling function: a law would go on flying the old code of an edited
 element. Therefore the cache lies in the folder of `cache`, which is named by the hash of all sources that can be
-compiled together. This module sets ``NUMBA_CACHE_DIR``, and is the only one that imports numba.
+compiled together; a law from another package, with what is compiled for it alone, has a folder of its own. This module
+sets ``NUMBA_CACHE_DIR``, and is the only one that imports numba.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ __all__ = [
     "fields",
     "fill",
     "instantiate",
+    "is_guest",
     "is_left_out",
     "layout",
     "moved",
@@ -101,6 +103,27 @@ def _compiled(function: F, **options: Any) -> F:
     return numba.njit(**settings)(function)  # type: ignore[no-any-return]
 
 
+_OURS = __name__.split(".")[0] + "."
+_GUEST = "__guest__"
+"""Name, in a template, that says whether it is filled in with a law from another package."""
+
+
+def is_guest(module: Any) -> bool:
+    """Whether a module, or the module of that name, belongs to another package, or is filled in with one that does."""
+    name = module if isinstance(module, str) else module.__name__
+    return not name.startswith(_OURS) or bool(getattr(module, _GUEST, False))
+
+
+def _names_guest(kind: Any) -> bool:
+    """Whether numba's type ``kind`` is, or is made of, a class of another package."""
+    if isinstance(kind, tuple | list):
+        return any(map(_names_guest, kind))
+    made = getattr(kind, "instance_class", None)
+    if made is not None and is_guest(made.__module__):
+        return True
+    return isinstance(kind, BaseTuple) and any(map(_names_guest, kind.types))
+
+
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
     """Compiled code of one function on disk, to which several processes may add at a time.
 
@@ -123,7 +146,12 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
             return {}
 
     def save(self, key: Any, data: Any) -> None:
-        """Add the code ``data`` for the types ``key``; where it cannot be written, the next start compiles again."""
+        """Add the code ``data`` for the types ``key``; where it cannot be written, the next start compiles again.
+
+        What a function of ours does with records of a law from elsewhere is not kept: it would outlive their edit.
+        """
+        if self._cache_path.startswith(str(cache_folder)) and _names_guest(key[0]):
+            return
         try:
             with cache.alone(cache_folder):
                 os.makedirs(self._cache_path, exist_ok=True)
@@ -142,6 +170,11 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc]
 class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
     """Uses the folder of `cache` even where it cannot be written: numba would fall back to ``__pycache__``, which does
     not notice an edit elsewhere."""
+
+    def __init__(self, function: Any, file: str) -> None:
+        super().__init__(function, file)
+        if is_guest(sys.modules.get(function.__module__, function.__module__)):
+            self._cache_path = str(cache.guest_folder() / self.get_suitable_cache_subpath(file))
 
     def ensure_cache_path(self) -> None:
         """Do nothing: `_CacheFile.save` creates it."""
@@ -386,6 +419,7 @@ def instantiate(template: str, name: str, **names: Any) -> ModuleType:
     assert place.loader is not None
     module = importlib.util.module_from_spec(place)
     module.__dict__.update(names)
+    module.__dict__[_GUEST] = any(is_guest(one) for one in names.values() if isinstance(one, ModuleType))
     sys.modules[full_name] = module
     place.loader.exec_module(module)
     return module
