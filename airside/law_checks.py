@@ -9,6 +9,7 @@ import ast
 import difflib
 import functools
 import inspect
+import linecache
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -43,9 +44,12 @@ def shown_path(file: str) -> str:
 
 
 def place_of(function: Any) -> str:
-    """File and line of a function, compiled or not."""
+    """File and line of a function, compiled or not: of its ``def``, below its decorators."""
     code = getattr(function, "py_func", function).__code__
-    return f"{shown_path(code.co_filename)}:{code.co_firstlineno}"
+    line = code.co_firstlineno
+    while linecache.getline(code.co_filename, line).lstrip().startswith("@"):
+        line += 1
+    return f"{shown_path(code.co_filename)}:{line}"
 
 
 def similar(name: str, known: Iterable[str]) -> str:
@@ -106,7 +110,7 @@ def _commands(module: ModuleType) -> Iterator[str]:
         )
     elif outputs[: len(commands)] != commands:
         yield (
-            f"{_place_of_name(module, 'Output')}: Output must begin with the commands {', '.join(commands)}, "
+            f"{_place_of_name(module, 'COMMANDS')}: Output must begin with the commands {', '.join(commands)}, "
             f"as COMMANDS lists them; it has {', '.join(outputs)}"
         )
 

@@ -16,10 +16,14 @@ from ftcc.airside.scheme import LARGEST_COMMAND, LARGEST_STATE, Scheme
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.compiled import is_left_out, layout
 
-__all__ = ["describe_error", "describe_left_out", "describe_not_finite", "package_of"]
+__all__ = ["NOT_FINITE", "describe_error", "describe_left_out", "describe_not_finite", "package_of"]
 
 _PYTHONS = (TypeError, AttributeError, NameError, IndexError, KeyError, ValueError, ZeroDivisionError, OverflowError)
 """Errors whose text says what is wrong without the name of their class."""
+
+
+NOT_FINITE = "step gave no finite number"
+"""In the text of an event: what `describe_not_finite` says."""
 
 
 def package_of(module: ModuleType) -> list[ModuleType]:
@@ -54,7 +58,7 @@ def describe_not_finite(scheme: Scheme, autopilots: Autopilots, i: int) -> str:
         *_strange("state", _entries(module.State), autopilots.state[i], LARGEST_STATE),
         *_strange("shared", shared, autopilots.shared[i], LARGEST_COMMAND),
     ]
-    return f"{place_of(module.step)}: step gave no finite number: {', '.join(found) or 'command'}"
+    return f"{place_of(module.step)}: {NOT_FINITE}: {', '.join(found) or 'command'}"
 
 
 def _strange(kind: str, names: Sequence[str], values: NDArray[np.float64], largest: float) -> list[str]:

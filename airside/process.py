@@ -204,7 +204,7 @@ class AutopilotProcess:
         if not text:
             raise error
         i = int(self.group.autopilots.stepping[0])
-        self.gate.report(LawFailed(text, self.specs[i].uav, int(self.group.done[i]) * self.timing.period_us))
+        self.gate.report(LawFailed(text, int(self.group.done[i]) * self.timing.period_us))
         self.end()
 
     def end_lost(self) -> None:
@@ -216,7 +216,7 @@ class AutopilotProcess:
             if not self.group.alive[i] and link.view.alive:
                 text = describe_not_finite(link.view.scheme, self.group.autopilots, i)
                 at_us = int(self.group.done[i]) * self.timing.period_us
-                self.gate.report(EventReport("error", text, self.specs[i].uav, at_us))
+                self.gate.report(EventReport("warning", text, self.specs[i].uav, at_us))
                 keep_sent(self.group.wire, i, self.vehicles[i].pack(ending_message()))
                 send_again(self.group.wire, i)
                 link.end()

@@ -10,6 +10,7 @@ from .scenario import ScenarioWarning as ScenarioWarning
 from .scenario import load as load
 from .scenario import resolve as resolve
 from .simulation import Flight as Flight
+from .simulation import LawError as LawError
 from .simulation import fly_in_memory as fly_in_memory
 from .simulation import fly_to_disk as fly_to_disk
 from .simulation import simulate as simulate

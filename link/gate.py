@@ -82,7 +82,6 @@ class LawFailed:
 
     text: str
     """File, line, error, UAV and time."""
-    uav: int
     at_us: int
     """Simulated time, us."""
 

@@ -10,12 +10,20 @@ from typing import Annotated
 import typer
 
 from ftcc.groundside.cli.common import fail, terminal, warn
+from ftcc.groundside.cli.new_law import new_law
 
 __all__ = ["new"]
 
 
 def new(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario to be written: NAME.toml.")],
+    ctx: typer.Context,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The scenario to be written: NAME.toml; the folder of a law.")
+    ],
+    law: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Write the package of a control law into the folder FILE instead."),
+    ] = None,
     scheme: Annotated[str, typer.Option(help="Control law; `ftcc list` names them.")] = "containment",
     followers: Annotated[int, typer.Option(help="Number of followers.")] = 6,
     leaders: Annotated[int | None, typer.Option(help="Number of leaders; default: what the scheme needs.")] = None,
@@ -29,7 +37,13 @@ def new(
     loss: Annotated[float, typer.Option(help="Share of records lost.")] = 0.0,
     duration: Annotated[float, typer.Option(help="Simulated time, s.")] = 60.0,
 ) -> None:
-    """Write a scenario for a swarm of any size and graph; it is checked and flown before."""
+    """Write a scenario for a swarm of any size and graph, checked and flown before; or a control law to begin with."""
+    if law is not None:
+        given = [name for name in ctx.params if name not in ("file", "law") and _is_given(ctx, name)]
+        if given:
+            fail(f"--law: takes no --{', --'.join(given)}; change the scenario that comes with the law")
+        new_law(law, file)
+        return
     if file.suffix != ".toml" or file.name.count(".") > 1:
         fail(f"{file}: must be NAME.toml")
     if file.exists():
@@ -51,3 +65,8 @@ def new(
         soft_wrap=True,
     )
     out.print(f"see it: ftcc fly {file}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _is_given(ctx: typer.Context, name: str) -> bool:
+    source = ctx.get_parameter_source(name)
+    return source is not None and source.name != "DEFAULT"

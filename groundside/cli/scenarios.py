@@ -189,7 +189,7 @@ def simulate(
             run = simulate_mission(mission, folder, lambda t: progress.update(task, completed=t), ready)
         finally:
             compiling.cancel()
-    _show_errors(run)
+    _show_divergence(run)
     show_summary(folder, run.claims())
     judged(run.verdict, strict)
     if run.lost or run.verdict.flown < mission.timing.duration:
@@ -228,13 +228,13 @@ def _simulate_in_lines(mission: Mission, folder: Path, strict: bool) -> None:
         raise typer.Exit(code)
 
 
-def _show_errors(run: Run) -> None:
-    """Print what went wrong with UAVs beside the losses, which the verdict names."""
-    from ftcc.link.recording import AIRCRAFT_LOST
+def _show_divergence(run: Run) -> None:
+    """Print which number of a law was not finite; that a UAV is lost by it says the verdict."""
+    from ftcc.airside.law_errors import NOT_FINITE
 
     out = terminal(stderr=True)
     for event in run.events:
-        if event["severity"] == "error" and event.get("uav") and not event["text"].startswith(AIRCRAFT_LOST):
+        if NOT_FINITE in event["text"]:
             text = f"{event['t']:8.2f} s  UAV {event['uav']}: {event['text']}"
             out.print(text, style="bold red", markup=False, highlight=False, soft_wrap=not out.is_terminal)
 

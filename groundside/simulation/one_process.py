@@ -201,7 +201,7 @@ def _describe_divergence(mission: Mission, world: Any, known: set[int]) -> list[
         if i not in known:
             known.add(i)
             text = describe_not_finite(mission.scheme, world.autopilots, i)
-            events.append((float(world.recording.lost_us[i]) / 1e6, mission.uavs[i], "error", text))
+            events.append((float(world.recording.lost_us[i]) / 1e6, mission.uavs[i], "warning", text))
     return events
 
 

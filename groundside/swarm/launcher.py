@@ -309,10 +309,10 @@ class SwarmProcesses:
             case Lost(uav, at_us, reason):
                 self.outcome.lost[uav] = reason
                 self.on_event(Event(at_us / 1e6, "error", f"{AIRCRAFT_LOST}{reason}", uav))
-            case LawFailed(text, uav, at_us):
+            case LawFailed(text, at_us):
                 if not self.outcome.law_error:
                     self.outcome.law_error = text
-                    self.on_event(Event(at_us / 1e6, "error", text, uav))
+                    self.on_event(Event(at_us / 1e6, "error", text))
                 self.stop()
             case EventReport(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))

@@ -1,0 +1,5 @@
+"""Packages to begin with: a control law with its scenario, test and page, written from templates."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
