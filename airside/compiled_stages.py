@@ -21,9 +21,6 @@ from ftcc.link.timing import Timing
 
 __all__ = ["flight_of", "placeholder", "stages_of"]
 
-_SLOWLY = "slowly"
-_HOW = "compiled laws fly faster: docs/tutorials/own-law.md"
-
 
 @functools.cache
 def stages_of(name: str, active: bool = False) -> ModuleType:
@@ -41,11 +38,11 @@ def stages_of(name: str, active: bool = False) -> ModuleType:
         tolerance=active_tolerance if active else passive_tolerance,
     )
     autopilots, inbox = build([placeholder(name, active)], Timing(1, 1, 1, 1, 1, 1, 1))
-    lacking = describe_left_out(scheme.module)
-    because = lacking or refusal(stages.control, autopilots, inbox, 0, 0.01)
+    because = describe_left_out(scheme.module)
+    if not because and (refused := refusal(stages.control, autopilots, inbox, 0, 0.01)):
+        because = f"numba cannot compile it ({refused})"
     if because:
-        why = f"{'it is not compiled' if lacking else 'numba cannot compile it'} ({because}); {_HOW}"
-        stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, {_SLOWLY}: {why}"
+        stages.__dict__["REFUSAL"] = f"scheme {name} flies as plain Python, slowly: {because}"
         uncompile([stages, *package_of(scheme.module)])
     return stages
 

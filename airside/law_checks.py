@@ -121,11 +121,13 @@ def _commands(module: ModuleType) -> Iterator[str]:
 @functools.cache
 def _tree(module: ModuleType) -> tuple[str, ast.Module]:
     """File and syntax tree of a module; an empty one where there is no source."""
-    file = getattr(module, "__file__", None) or ""
+    file = getattr(module, "__file__", None)
+    if not file:
+        return module.__name__, ast.Module([], [])
     try:
         return shown_path(file), ast.parse(Path(file).read_text(encoding="utf-8"))
     except (OSError, SyntaxError, ValueError):
-        return shown_path(file) or module.__name__, ast.Module([], [])
+        return shown_path(file), ast.Module([], [])
 
 
 def _place_of_name(module: ModuleType, name: str) -> str:

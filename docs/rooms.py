@@ -21,6 +21,7 @@ LABELS = {
     "dashboard": "live view",
     "results": "a run's folder",
     "generator": "scenarios in a line",
+    "templates": "packages to begin with",
     "verdict": "how it went",
     "scenario": "files to specs",
     "claims": "what must hold",

@@ -244,7 +244,7 @@ def _reason(text: str) -> str:
     place = next((found for line in lines if "/numba/" not in line and (found := _PLACE.match(line))), None)
     where = f"{place[1]}:{place[2]}: " if place else ""
     if _MAKES_ARRAY.match(call) or "array(" in call:
-        return f"{where}{call} makes an array, and compiled code may make none"
+        return f"{where}{call} makes an array, which compiled code may not: use floats, tuples, or an array in State"
     if name := re.match(r"Untyped global name '(\w+)'.*<class 'function'>", first):
         return f"{where}{name[1]} is not @compiled, so compiled code cannot call it"
     return where + "; ".join(filter(None, (first.rstrip(":"), call)))

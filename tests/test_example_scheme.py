@@ -24,23 +24,36 @@ pytestmark = pytest.mark.slow
 
 SCENARIO = EXAMPLE / "consensus.toml"
 SECONDS = 3.0
+LAW = (EXAMPLE / "altitude_consensus.py").read_text()
 
 # The same law, written as numba cannot compile it.
-PLAIN = (
-    (EXAMPLE / "altitude_consensus.py")
-    .read_text()
+PLAIN = LAW.replace(
+    "S1, S2 = own.z - s.z_r, own.V - reference.V",
+    'errors = {"z": own.z - s.z_r, "V": own.V - reference.V}\n    S1, S2 = errors["z"], errors["V"]',
+)
+
+# The same law in numpy, without compilation.
+NUMPY = (
+    LAW.replace("@compiled\n", "")
+    .replace("from typing", "import numpy as np\n\nfrom typing", 1)
     .replace(
         "S1, S2 = own.z - s.z_r, own.V - reference.V",
-        'errors = {"z": own.z - s.z_r, "V": own.V - reference.V}\n    S1, S2 = errors["z"], errors["V"]',
+        "S1, S2 = np.array([own.z, own.V]) - np.array([s.z_r, reference.V])",
     )
 )
+
+UNCOMPILED = {
+    "plain_consensus": r"numba cannot compile it \(.*plain_consensus\.py:\d+: ",
+    "numpy_consensus": r".*numpy_consensus\.py:\d+: start, step and share are without @compiled",
+}
+"""Why these fly as plain Python."""
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder on the path with the example's package in it, and with the law that numba refuses."""
+    """A folder on the path with the example's package in it, and with laws that are not compiled."""
     target = tmp_path_factory.mktemp("site")
-    install(EXAMPLE, target, {"plain_consensus": PLAIN})
+    install(EXAMPLE, target, {"plain_consensus": PLAIN, "numpy_consensus": NUMPY})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(target))
         forget_schemes()
@@ -100,17 +113,18 @@ def test_it_is_listed_and_flies_as_processes_bit_for_bit(installed: Path, flown:
     assert same_flight(tmp_path / "run", flown.path)
 
 
-def test_a_scheme_that_numba_refuses_flies_as_plain_python_with_the_same_bits(
-    installed: Path, flown: Run, tmp_path: Path
+@pytest.mark.parametrize("scheme", UNCOMPILED)
+def test_a_scheme_that_is_not_compiled_flies_as_plain_python_with_the_same_bits(
+    scheme: str, installed: Path, flown: Run, tmp_path: Path
 ) -> None:
-    refusal = "scheme plain_consensus flies as plain Python, slowly: numba cannot compile it"
-    with pytest.warns(PlainPython, match=rf"{refusal} \(.*plain_consensus\.py") as warned:
-        run = simulate(mission("plain_consensus", SECONDS), tmp_path / "simulated")
+    refusal = f"scheme {scheme} flies as plain Python"
+    with pytest.warns(PlainPython, match=rf"{refusal}, slowly: {UNCOMPILED[scheme]}") as warned:
+        run = simulate(mission(scheme, SECONDS), tmp_path / "simulated")
     # Others may be there: of a cache that another process is writing into.
     assert len([one for one in warned if issubclass(one.category, PlainPython)]) == 1
     assert same_flight(run.path, flown.path)
 
-    options = ("--set", "scheme=plain_consensus", "--speed", "max", "--viewer", "none", "--duration", f"{SECONDS:g}")
+    options = ("--set", f"scheme={scheme}", "--speed", "max", "--viewer", "none", "--duration", f"{SECONDS:g}")
     output = ftcc(installed, tmp_path, "fly", str(SCENARIO), *options, "--out", str(tmp_path / "flown"))
     assert output.count(refusal) == 1, "said once, not by every process"
     assert same_flight(tmp_path / "flown", flown.path)

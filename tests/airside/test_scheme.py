@@ -109,7 +109,7 @@ def test_overrides_come_last_and_change_nothing_else(containment):
 @pytest.mark.parametrize(
     ("form", "overrides", "because"),
     [
-        ("flight", {"k99": 1.0}, "scheme containment has no gain 'k99'; it has k11, k12"),
+        ("flight", {"k99": 1.0}, "scheme containment has no gain 'k99'; there are k11, k12"),
         ("flight", {"k11": math.nan}, "gain k11 = nan: must be a finite number"),
         ("flight", {"k11": math.inf}, "gain k11 = inf: must be a finite number"),
         ("fligth", {}, "scheme containment has no form 'fligth'; it has monograph, flight"),
@@ -176,14 +176,14 @@ def test_a_gain_that_nobody_gave_a_value_must_be_given(containment):
     class Gains(NamedTuple):
         k: Annotated[float, Quantity("k", "1/s")]
 
-    scheme = Scheme("mine", file_like(containment, Gains=Gains, FORMS={"flight": {}}, RANGES={}))
+    scheme = Scheme("mine", file_like(containment, Gains=Gains, FORMS={"flight": {}}, RANGES={}, SWITCHES={}))
     with pytest.raises(ValueError, match="gains k have no published value and must be given"):
         scheme.gains("flight", {})
     assert scheme.gains("flight", {"k": 2.0}).k == 2.0
 
 
 def test_a_range_of_a_gain_that_there_is_not_is_refused(containment):
-    with pytest.raises(SchemeError, match="RANGES name k99, which are no gains"):
+    with pytest.raises(SchemeError, match="RANGES names k99, which is no gain"):
         Scheme("mine", file_like(containment, RANGES={FEEDBACK: "k11 k99"}))
 
 
