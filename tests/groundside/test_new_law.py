@@ -25,6 +25,7 @@ def new(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.delitem(sys.modules, NAME, raising=False)
     with pytest.raises(SystemExit) as ended:
         new(monkeypatch, "--law", NAME, str(tmp_path / "law"))
     assert ended.value.code == 0
