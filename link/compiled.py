@@ -241,6 +241,7 @@ def _reason(text: str) -> str:
     lines = [line.strip() for line in text.splitlines()]
     first, *more = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))] or [""]
     call = next((line.removeprefix(">>>").strip() for line in more[:2] if line.startswith(">>>")), "")
+    call = re.sub(r"Literal\[\w+\]\((.*?)\)", r"\1", call)
     place = next((found for line in lines if "/numba/" not in line and (found := _PLACE.match(line))), None)
     where = f"{place[1]}:{place[2]}: " if place else ""
     if _MAKES_ARRAY.match(call) or "array(" in call:

@@ -106,7 +106,7 @@ DIVERGES = {
 NOT_COMPILED = {
     "makes_array": (
         before("h = np.zeros(3)[0]"),
-        "zeros(Literal[int](3)) makes an array, which compiled code may not",
+        "zeros(3) makes an array, which compiled code may not",
     ),
     "helper": (
         law(
