@@ -115,7 +115,7 @@ def _fly(output: FlightOutput, ports: PortBlock) -> Outcome:
 
 
 def _exit_code(outcome: Outcome, strict: bool) -> int:
-    """Return 2 for a mistake in the law, 1 for a loss or a dead process, and 3 if ``strict`` and the verdict is failed."""
+    """Return 2 for a mistake in the law, 1 for a loss or a dead process, 3 if ``strict`` and the verdict is failed."""
     from ftcc.groundside.verdict import FAILED
 
     if outcome.law_error:
