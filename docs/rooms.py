@@ -16,6 +16,7 @@ LABELS = {
     "cli": "the command ftcc",
     "studies": "many flights",
     "report": "page, figures",
+    "movie": "a film of a run",
     "swarm": "flight with processes",
     "simulation": "flight in one process",
     "dashboard": "live view",
@@ -142,7 +143,7 @@ def table(found: dict[str, set[str]]) -> str:
 
 
 def rooms() -> dict[str, set[str]]:
-    """The arrows without the leaves of groundside (errors, text, palette, canvas), which every room may use."""
+    """The arrows without the leaves of groundside (errors, text, palette, ...), which every room may use."""
     found = arrows()
     found.pop("groundside")
     return {room: used - {"groundside"} for room, used in found.items()}

@@ -16,6 +16,7 @@ from ftcc.groundside.cli import (
     failures,
     fly,
     ground,
+    movie,
     new,
     results,
     scenarios,
@@ -53,7 +54,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         airframe.airframe,
     ),
     "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),
-    "Results": (results.report, results.export, results.compare, view.replay),
+    "Results": (results.report, results.export, results.compare, movie.movie, view.replay),
     "Commands to a running swarm": (
         ground.vehicles,
         ground.fault,

@@ -24,6 +24,7 @@ EXAMPLES = {
     "ftcc report": "ftcc report runs/demo-20260101-120000 --style ieee --csv signals.csv",
     "ftcc export": "ftcc export runs/demo-20260101-120000 --format mcap --out flight.mcap",
     "ftcc compare": "ftcc compare runs/with runs/without --out runs/compared",
+    "ftcc movie": "ftcc movie runs/demo-20260101-120000 demo.gif --seconds 10 --size 960x540",
     "ftcc replay": "ftcc replay runs/demo-20260101-120000 --viewer native",
     "ftcc vehicles": "ftcc vehicles",
     "ftcc fault": "ftcc fault 1 elevator --effectiveness 0.7 --bias 0.2 --at 60",

@@ -1,4 +1,9 @@
 from .comparison import Comparison as Comparison
+from .curves import Curve as Curve
+from .curves import Flown as Flown
+from .curves import curves_of as curves_of
+from .curves import has_columns as has_columns
+from .drawing import thinned as thinned
 from .page import Cell as Cell
 from .page import Head as Head
 from .page import Section as Section

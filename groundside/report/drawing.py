@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["add_legend", "anchor_of", "draw", "draw_timeline", "figure_of", "folded"]
+__all__ = ["add_legend", "anchor_of", "draw", "draw_timeline", "figure_of", "folded", "thinned"]
 
 Array = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def _draw_panel(axes: Axes, panel: Panel, flights: Sequence[Flown], look: Look) 
                 color = INK
             y = curve.y if panel.turn is None else unwrapped(curve.y, panel.turn)
             style = "--" if curve.uav in leaders and panel.pairs is None else "-"
-            axes.plot(*_thinned(curve.x, y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
+            axes.plot(*thinned(curve.x, y), style, color=color, zorder=3 + n, linewidth=0.8 if several else 1.0)
             if panel.shared:
                 break
         if n == 0:
@@ -167,15 +167,15 @@ def _draw_bounds(axes: Axes, panel: Panel, flight: Flown) -> None:
         begins = {c.uav: c.y for c in curves_of(panel.y, flight, panel.uavs, None, panel.window, panel.x)}
         for curve in curves_of(panel.reference, flight, panel.uavs, None, panel.window, panel.x):
             y = curve.y if panel.turn is None else unwrapped(curve.y, panel.turn, begins.get(curve.uav))
-            axes.plot(*_thinned(curve.x, y), "--", color=hexadecimal(tints[curve.uav]), linewidth=0.5, zorder=2)
+            axes.plot(*thinned(curve.x, y), "--", color=hexadecimal(tints[curve.uav]), linewidth=0.5, zorder=2)
     if panel.bound is not None:
         for curve in curves_of(panel.bound, flight, panel.uavs, None, panel.window, panel.x):
-            x, y = _thinned(curve.x, np.abs(curve.y))
+            x, y = thinned(curve.x, np.abs(curve.y))
             for sign in (1.0, -1.0):
                 axes.plot(x, sign * y, "--", color=hexadecimal(GRAY), linewidth=0.8, zorder=2)
     if panel.true is not None:
         for curve in curves_of(panel.true, flight, panel.uavs, None, panel.window, panel.x):
-            axes.plot(*_thinned(curve.x, curve.y), ":", color=INK, linewidth=0.9, zorder=5)
+            axes.plot(*thinned(curve.x, curve.y), ":", color=INK, linewidth=0.9, zorder=5)
 
 
 def _mark_events(axes: Axes, panel: Panel, flight: Flown) -> None:
@@ -304,7 +304,7 @@ def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str, look:
     """Draw curves (name, colour, times, values) of non-negative quantities over time, with the axis from zero."""
     with plt.rc_context(look.style):
         figure, axes = plt.subplots(figsize=(look.width, _LEGEND + look.row), layout="constrained")
-        lines = [axes.plot(*_thinned(t, y), color=color, label=name)[0] for name, color, t, y in curves]
+        lines = [axes.plot(*thinned(t, y), color=color, label=name)[0] for name, color, t, y in curves]
         axes.set(xlabel="t, s", ylabel=folded(label, look))
         axes.margins(x=0.01)
         axes.set_ylim(bottom=0.0)
@@ -312,7 +312,7 @@ def figure_of(curves: Sequence[tuple[str, str, Array, Array]], label: str, look:
     return figure
 
 
-def _thinned(x: Array, y: Array) -> tuple[Array, Array]:
+def thinned(x: Array, y: Array) -> tuple[Array, Array]:
     """Keep a curve's least and greatest value in each of `_COLUMNS` parts, which looks the same but is smaller."""
     if len(y) <= 2 * _COLUMNS:
         return x, y

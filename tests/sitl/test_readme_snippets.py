@@ -39,6 +39,7 @@ SHORTER = {
     "fly": ["--duration", "1", "--viewer", "none", "--mavlink", "none", "--pack", "auto"],
     "verify": ["--case", "flight"],
     "study": ["--duration", "1", "--jobs", "1"],
+    "movie": ["--seconds", "0.2", "--size", "320x180"],
     "search": ["--jobs", "1", "--budget", "12"],
     "map": ["--duration", "1", "--jobs", "1", "--x", "faults.0.effectiveness=0.5:1:2", "--y", "faults.0.bias=0:0.1:2"],
 }
