@@ -24,6 +24,7 @@ from typing import Any
 from mkdocs.commands.build import build
 from mkdocs.config import load_config
 from mkdocs.exceptions import MkDocsException
+from reference_pages import PAGES
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
@@ -31,7 +32,7 @@ MOVED = {"docs/welcome.md": "index.md", "README.md": "start.md"}
 """Pages that stand elsewhere on the site: it begins with the gallery."""
 PICTURES = {".png", ".svg", ".gif"}
 LANGUAGES = {".py": "python", ".toml": "toml", ".yaml": "yaml", ".cff": "yaml", ".json": "json"}
-SCRIPTS = ("pictures.py", "rooms.py")
+SCRIPTS = ("pictures.py", "gallery.py", "rooms.py")
 """Which draw pictures in a minute or two."""
 LONG_SCRIPTS = ("active_studies.py", "closures.py", "diagnosis_figures.py")
 """Fly thousands of flights: called by hand."""
@@ -154,6 +155,8 @@ def stage(folder: Path) -> Stage:
     pages = [*ROOT.glob("*.md"), *(page for name in FOLDERS for page in (ROOT / name).rglob("*.md"))]
     for page in sorted(pages):
         staged.page(page)
+    for name, make in PAGES.items():
+        staged.write(name, make())
     shutil.copytree(ROOT / "docs" / "stylesheets", folder / "docs" / "stylesheets")
     return staged
 

@@ -137,7 +137,7 @@ class Plant(Strict):
     limits: Limits
     rate_limits: RateLimits = RateLimits()
     autothrottle: AutothrottleFields | None = None
-    fault: Literal["after_lag", "before_lag"] = "after_lag"
+    fault: Literal["after_lag", "before_lag"] = Field("after_lag", description="where faults of actuators act")
     initial_actuators: Literal["trim"] | dict[Actuator, float] = Field(
         "trim",
         description="N, rad: position, and command before the first one arrives. With trim and a delay, the first "

@@ -14,9 +14,9 @@ __all__ = ["ChannelFields", "EdgeFields", "GraphFields", "LinkEventFields"]
 class EdgeFields(Strict):
     """An edge of the communication graph: ``between`` two UAVs (both ways), or ``from`` a sender ``to`` a receiver."""
 
-    between: tuple[int, int] | None = None
-    sender: int | None = Field(None, alias="from")
-    receiver: int | None = Field(None, alias="to")
+    between: tuple[int, int] | None = Field(None, description="ids of two UAVs that hear each other")
+    sender: int | None = Field(None, alias="from", description="id of the UAV that is heard")
+    receiver: int | None = Field(None, alias="to", description="id of the UAV that hears it")
     weight: float = Field(gt=0.0, description="a_ij of the monograph")
 
     @model_validator(mode="after")
@@ -62,14 +62,14 @@ class LinkEventFields(Strict):
 
     at: float = Field(ge=0.0, description="s")
     until: float | None = Field(None, description="s; default: the change is permanent")
-    kind: Literal["cut", "degrade"]
-    uav: Id | None = None
+    kind: Literal["cut", "degrade"] = Field(description="nothing arrives, or the quality changes")
+    uav: Id | None = Field(None, description="its radio, in both directions")
     edge: tuple[Id, Id] | None = Field(None, description="[sender, receiver]")
     directed: bool = Field(False, description="only sender -> receiver")
-    loss: Probability | None = None
-    burst_start: Probability | None = None
-    burst_end: Probability | None = None
-    burst_loss: Probability | None = None
+    loss: Probability | None = Field(None, description="probability of loss of a record")
+    burst_start: Probability | None = Field(None, description="probability per record that a burst begins")
+    burst_end: Probability | None = Field(None, description="probability per record that a burst ends")
+    burst_loss: Probability | None = Field(None, description="probability of loss within a burst")
     delay: float | None = Field(None, ge=0.0, description="s")
     jitter: float | None = Field(None, ge=0.0, description="s")
 

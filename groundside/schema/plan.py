@@ -22,8 +22,8 @@ __all__ = ["Claim", "Plan", "Rates", "fields_of"]
 class Uavs(Strict):
     """Ids of the UAVs."""
 
-    followers: list[Id] = Field(min_length=1)
-    leaders: list[Id] = []
+    followers: list[Id] = Field(min_length=1, description="they fly the scheme")
+    leaders: list[Id] = Field([], description="reference points; their ids follow those of the followers")
 
 
 class Rates(Strict):
@@ -41,7 +41,7 @@ class GainFields(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, float]
 
-    uav: dict[Id, dict[str, float]] = {}
+    uav: dict[Id, dict[str, float]] = Field({}, description="gains of single UAVs, by name")
 
     @property
     def common(self) -> dict[str, float]:
@@ -58,16 +58,16 @@ class MissionFields(Strict):
 class Claim(Strict):
     """A number that a flight must show. ``expected`` has a value per case; a case that is missing has no such claim."""
 
-    name: str
-    metric: str
+    name: str = Field(description="a sentence's beginning, for the report")
+    metric: str = Field(description="how the signal becomes a number: a name of METRICS")
     signal: str = Field(description="arithmetic expression over columns of the recording")
-    uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
+    uavs: list[Id] | Literal["followers", "leaders", "all"] = Field("followers", description="whose signal")
     window: tuple[float, float] = Field(description="s, both ends included")
     within: list[tuple[float, float]] = Field([], description="s, evaluated parts of the window; default: all of it")
     threshold: float | dict[str, float] | None = Field(None, description="a number, or one per case")
-    unit: str = ""
-    source: str
-    expected: dict[str, float | list[float]]
+    unit: str = Field("", description="of the number")
+    source: str = Field(description="where the expected number comes from")
+    expected: dict[str, float | list[float]] = Field(description="by case: a number, or one per UAV")
     tolerance: str | dict[str, str] = Field(
         description='"15 %", "0.02", "10 % or 0.01", "< 0.05", "> 2" or "< 1.5 x"; one text, or by case'
     )
@@ -91,22 +91,22 @@ class FlownRun(Strict):
 class Flown(Strict):
     """Origin of a scenario in a run's folder."""
 
-    name: str
-    form: str
-    variants: list[str] = []
-    settings: list[str] = []
-    versions: dict[str, str] = {}
+    name: str = Field(description="name or file of the scenario")
+    form: str = Field(description="form of the law")
+    variants: list[str] = Field([], description="variants that were flown")
+    settings: list[str] = Field([], description="what --set changed")
+    versions: dict[str, str] = Field({}, description="of the program and of its libraries")
     run: FlownRun | None = None
 
 
 class Plan(Strict):
     """A scenario after its form, variants and settings have been merged."""
 
-    title: str
-    scheme: str
-    airframe: str = "reference_25kg"
+    title: str = Field(description="what it flies, for lists and reports")
+    scheme: str = Field(description="the control law: a name of `ftcc list`")
+    airframe: str = Field("reference_25kg", description="a bundled sheet, or the path of a TOML file")
     duration: float = Field(gt=0.0, le=1e5, description="s")
-    seed: int = Field(1, ge=0, lt=2**63)
+    seed: int = Field(1, ge=0, lt=2**63, description="of losses, jitter, noise, gusts and turbulence")
     record_rate: float = Field(100.0, gt=0.0, le=2000.0, description="Hz")
     uavs: Uavs
     rates: Rates
@@ -125,7 +125,7 @@ class Plan(Strict):
     obstacles: list[ObstacleFields] = []
     detection_range: float | None = Field(None, gt=0.0, description="m, range at which leaders detect an obstacle")
     gains: GainFields = GainFields()
-    switches: dict[str, bool] = {}
+    switches: dict[str, bool] = Field({}, description="false takes a part out of the law: fault_tolerance")
     diagnosis: DiagnosisFields = DiagnosisFields()
     disturbances: list[DisturbanceFields] = []
     faults: list[FaultFields] = []

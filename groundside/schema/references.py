@@ -15,7 +15,7 @@ class Filter(Strict):
     """Second-order filter: natural frequency and damping ratio."""
 
     frequency: float = Field(gt=0.0, description="rad/s")
-    damping: float = Field(gt=0.0)
+    damping: float = Field(gt=0.0, description="damping ratio")
 
 
 class CommandFields(Strict):
@@ -26,7 +26,7 @@ class CommandFields(Strict):
 
     at: float | None = Field(None, ge=0.0, description="s")
     until: float | None = Field(None, description="s, needs at; default: the next command")
-    uav: Id | None = None
+    uav: Id | None = Field(None, description="the leader that passes x; default: the own one")
     x: float | None = Field(None, description="m, forward position")
     altitude: float | None = Field(None, description="m; default: unchanged")
     speed: float | None = Field(None, gt=0.0, description="m/s; default: unchanged")

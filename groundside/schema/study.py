@@ -14,13 +14,13 @@ __all__ = ["StudyClaim", "StudyFields"]
 class StudyClaim(Strict):
     """A bound that every flight of a study is held to."""
 
-    name: str
-    metric: str
+    name: str = Field(description="a sentence's beginning, for the report")
+    metric: str = Field(description="how the signal becomes a number: a name of METRICS")
     signal: str = Field(description="arithmetic expression over columns of the recording")
-    uavs: list[Id] | Literal["followers", "leaders", "all"] = "followers"
+    uavs: list[Id] | Literal["followers", "leaders", "all"] = Field("followers", description="whose signal")
     window: tuple[float, float] = Field(description="s, both ends included")
-    threshold: float | None = None
-    unit: str = ""
+    threshold: float | None = Field(None, description="what some metrics need")
+    unit: str = Field("", description="of the number")
     bound: str = Field(pattern=r"^\s*[<>]", description='"< 5" or "> 0.2"')
 
     @model_validator(mode="after")

@@ -71,11 +71,11 @@ class FaultFields(Strict):
 
     at: float = Field(ge=0.0, description="s")
     until: float | None = Field(None, description="s, time of repair; default: the fault is permanent")
-    uav: Id
-    actuator: Actuator | None = None
-    navigation: Literal["position", "attitude"] | None = None
-    kind: Literal["wrong", "off", "stuck", "slow", "intermittent", "ok"] = "wrong"
-    effectiveness: Probability = 1.0
+    uav: Id = Field(description="whose fault")
+    actuator: Actuator | None = Field(None, description="which actuator fails, or")
+    navigation: Literal["position", "attitude"] | None = Field(None, description="which part of the solution")
+    kind: Literal["wrong", "off", "stuck", "slow", "intermittent", "ok"] = Field("wrong", description="see above")
+    effectiveness: Probability = Field(1.0, description="share of the actuator's motion that is left")
     bias: float = Field(0.0, description="rad or N")
     effectiveness_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")
     bias_onset: float = Field(0.0, ge=0.0, description="1/s, exponential; 0 = step")

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import math
+import subprocess
+import sys
 import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -128,6 +131,15 @@ def test_it_injects_and_repairs_an_elevator_fault(client: Client, swarm: Swarm) 
     assert len(changes) == 2
     assert before <= changes[0] <= injected + 0.2
     assert injected <= changes[1] <= repaired + 0.2
+
+
+def test_the_program_of_the_tutorial_injects_a_fault_and_repairs_it(swarm: Swarm) -> None:
+    program = Path(__file__).parents[2] / "docs" / "tutorials" / "mavsdk_fault.py"
+    command = [sys.executable, str(program), str(swarm.station)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert "repaired" in ended.stdout
+    assert 0.7 in Run(swarm.flight.folder).column("elevator_effectiveness", 3)
 
 
 def test_it_sets_an_attitude_target_through_offboard(client: Client) -> None:
