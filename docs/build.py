@@ -31,7 +31,7 @@ FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
 MOVED = {"docs/welcome.md": "index.md", "README.md": "start.md"}
 """Pages that stand elsewhere on the site: it begins with the gallery."""
 PICTURES = {".png", ".svg", ".gif"}
-LANGUAGES = {".py": "python", ".toml": "toml", ".yaml": "yaml", ".cff": "yaml", ".json": "json"}
+LANGUAGES = {".py": "python", ".pyi": "python", ".toml": "toml", ".yaml": "yaml", ".cff": "yaml", ".json": "json"}
 SCRIPTS = ("pictures.py", "gallery.py", "rooms.py")
 """Which draw pictures in a minute or two."""
 LONG_SCRIPTS = ("active_studies.py", "closures.py", "diagnosis_figures.py")
@@ -62,7 +62,7 @@ class Stage:
         pieces = _FENCE.split(path.read_text(encoding="utf-8"))
         for n in range(0, len(pieces), 2):  # every second piece is code
             pieces[n] = _LINK.sub(lambda found: self._link(found, path, place), pieces[n])
-        self.write(place, "".join(pieces))
+        self.write(place, "".join(pieces) + offered(path.parent))
 
     def _link(self, found: re.Match[str], page: Path, place: str) -> str:
         """A link of a page, as it is on the site. What leads nowhere stays, for MkDocs to find."""
@@ -89,6 +89,14 @@ class Stage:
             self.sources.add(page)
             self.write(page, source_page(target, name))
         return page
+
+
+def offered(room: Path) -> str:
+    """What a room of `groundside` offers to the others, for the end of its page; empty for other folders."""
+    stub = room / "__init__.pyi" if (room / "__init__.pyi").exists() else room / "__init__.py"
+    if room.parent != ROOT / "groundside" or not stub.exists():
+        return ""
+    return f"\n\n## What the others use of it\n\n{fenced(stub)}"
 
 
 def source_page(path: Path, name: str) -> str:
@@ -157,7 +165,8 @@ def stage(folder: Path) -> Stage:
         staged.page(page)
     for name, make in PAGES.items():
         staged.write(name, make())
-    shutil.copytree(ROOT / "docs" / "stylesheets", folder / "docs" / "stylesheets")
+    for name in ("javascripts", "stylesheets"):
+        shutil.copytree(ROOT / "docs" / name, folder / "docs" / name)
     return staged
 
 

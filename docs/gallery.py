@@ -1,10 +1,11 @@
-"""Draws a picture of each scheme for the first page of the site: ``python docs/gallery.py``; half a minute.
+"""Draws a picture of each scheme for the first page of the site: ``python docs/gallery.py [SCHEME ...]``.
 
 Flies the shipped scenario of each scheme in its flight form and draws one figure of its report.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from pathlib import Path
 
@@ -35,7 +36,8 @@ def main() -> None:
     folder = PICTURES / "gallery"
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
-        for scheme, figure in FIGURES.items():
+        for scheme in sys.argv[1:] or FIGURES:
+            figure = FIGURES[scheme]
             run = simulate(resolve(load(scheme, form="flight")), Path(name) / scheme)
             mission = run.mission
             sheet = sheet_of(mission)

@@ -21,7 +21,7 @@ from ftcc.airside.gcs import COMMANDS, MESSAGES
 from ftcc.airside.scheme import quantities
 from ftcc.groundside.claims.metrics import METRICS
 from ftcc.groundside.cli.app import app
-from ftcc.groundside.schema import AirframeSheet, Plan
+from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 from ftcc.link.failures import SIZES
 from ftcc.link.mavlink import dialect
 
@@ -71,7 +71,9 @@ def test_every_page_has_a_picture_or_an_example(site: Path) -> None:
 
 
 def test_nothing_is_fetched_from_elsewhere(site: Path) -> None:
-    fetched = re.compile(r"""<(?:script|img|iframe)[^>]*\ssrc="(https?:[^"]*)|<link rel="stylesheet" href="(https?:[^"]*)""")
+    fetched = re.compile(
+        r"""<(?:script|img|iframe)[^>]*\ssrc="(https?:[^"]*)|<link rel="stylesheet" href="(https?:[^"]*)"""
+    )
     found = {
         str(page.relative_to(site)): match
         for page in site.rglob("*.html")
@@ -91,10 +93,10 @@ def models_of(model: Any) -> Iterator[type[BaseModel]]:
             yield from models_of(inner)
 
 
-@pytest.mark.parametrize(("model", "page"), [(Plan, "scenario"), (AirframeSheet, "airframe")])
+@pytest.mark.parametrize(("model", "page"), [((Plan,), "scenario"), ((AirframeSheet, PointMassSheet), "airframe")])
 def test_every_field_of_the_schema_is_on_its_page(model: Any, page: str, site: Path) -> None:
     text = article_of(site / "reference" / f"{page}.html")
-    models = {one: None for one in models_of(model)}
+    models = {one: None for whole in model for one in models_of(whole)}
     fields = [field.alias or name for one in models for name, field in one.model_fields.items()]
     assert len(fields) > 20
     for name in set(fields):
@@ -117,7 +119,11 @@ def test_every_command_is_on_its_page_with_every_option(site: Path) -> None:
 
 def test_messages_failures_metrics_gains_are_on_their_pages(site: Path) -> None:
     names = {
-        "mavlink": [*(dialect.enums["MAV_CMD"][number].name for number in COMMANDS), *MESSAGES, *(s.name for s in SIZES)],
+        "mavlink": [
+            *(dialect.enums["MAV_CMD"][number].name for number in COMMANDS),
+            *MESSAGES,
+            *(s.name for s in SIZES),
+        ],
         "metrics": [*METRICS],
         "gains": [gain for name in schemes.names() for gain in quantities(schemes.find(name).gains_type)],
         "columns": [s.name for name in schemes.names() for s in schemes.find(name).signals],
@@ -145,14 +151,14 @@ def test_what_is_wrong_with_a_page_ends_the_build(
 
     def stage(folder: Path) -> Any:
         staged = build.Stage(folder)
-        staged.write("index.md", "# A\n\n[b](b.md)\n[c](#c)\n![d](d.png)\n\n$\\frac{1$ and $\\alpha$\n")
+        staged.write("index.md", "# A\n\n[b](b.md)\n[c](#c)\n![d](d.png)\n\n$\\nonsense$, $\\left( 1$ and $\\alpha$\n")
         return staged
 
     monkeypatch.setattr(build, "stage", stage)
     with pytest.raises(MkDocsException):
         build.build_site(tmp_path / "site")
     said = capsys.readouterr().err
-    for fault in ("'b.md'", "'#c'", "'d.png'", "\\\\frac{1"):
+    for fault in ("'b.md'", "'#c'", "'d.png'", "\\\\nonsense", "\\\\left( 1"):
         assert fault in said, said
     assert "\\alpha" not in said
     assert "<mi>&#x003B1;</mi>" in (tmp_path / "site" / "index.html").read_text(encoding="utf-8")

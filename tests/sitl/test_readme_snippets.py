@@ -55,6 +55,7 @@ NOT_RUN = {
     "python3 -m venv": "sets up an environment from a network",
     "pip install": "installs; the tests put the example on the path themselves",
     "pytest": "is these tests",
+    "python docs/build.py": "builds the site: tests/test_site.py",
     "ftcc doctor": "flies for a quarter of a minute: tests/groundside/swarm/test_doctor.py",
     "ftcc calibrate": "writes beside a shipped scenario: tests/groundside/studies/test_calibration.py",
     "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
