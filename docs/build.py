@@ -92,9 +92,9 @@ class Stage:
 
 
 def offered(room: Path) -> str:
-    """What a room of `groundside` offers to the others, for the end of its page; empty for other folders."""
+    """What `groundside` or a room of it offers, for the end of its page; empty for other folders."""
     stub = room / "__init__.pyi" if (room / "__init__.pyi").exists() else room / "__init__.py"
-    if room.parent != ROOT / "groundside" or not stub.exists():
+    if "groundside" not in (room.name, room.parent.name) or not stub.exists():
         return ""
     return f"\n\n## What the others use of it\n\n{fenced(stub)}"
 

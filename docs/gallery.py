@@ -9,8 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from PIL import Image
 from pictures import PICTURES, small
+from PIL import Image
 
 from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import sheet_of

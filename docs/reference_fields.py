@@ -151,8 +151,8 @@ def scenario_fields() -> str:
         (
             "# Fields of a scenario",
             "",
-            "Every field of a scenario's file, from the schema that checks it. Numbers are finite, in SI units, angles in",
-            "rad. An empty default means: not given. A field that is not here is refused, with its line:",
+            "Every field of a scenario's file, from the schema that checks it. Numbers are finite, in SI units, angles",
+            "in rad. An empty default means: not given. A field that is not here is refused, with its line:",
             "",
             "    ftcc check demo",
             "",
@@ -180,8 +180,8 @@ def sheet_fields() -> str:
         (
             "# Fields of an airframe sheet",
             "",
-            "A sheet is a TOML file. [Your own aircraft](../docs/tutorials/own-aircraft.md) shows how to write one, and",
-            "[the shipped ones](../groundside/airframes.md) are examples.",
+            "A sheet is a TOML file. [Your own aircraft](../docs/tutorials/own-aircraft.md) shows how to write one,",
+            "and [the shipped ones](../groundside/airframes.md) are examples.",
             "",
             "    ftcc airframe --airspeed 25",
             "",

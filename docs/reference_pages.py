@@ -44,8 +44,8 @@ def all_commands() -> dict[str, Any]:
 def command_line() -> str:
     """Every command with its arguments, options and example."""
     sections = [
-        "# Every command\n\nWhat `ftcc COMMAND --help` says. [Command line](../docs/command-line.md) explains exit codes,"
-        " folders and completion.\n"
+        "# Every command\n\nWhat `ftcc COMMAND --help` says. [Command line](../docs/command-line.md) explains exit"
+        " codes, folders and completion.\n"
     ]
     for path, command in all_commands().items():
         context = command.context_class(command, info_name=path)
@@ -93,8 +93,8 @@ def mavlink() -> str:
         (
             "# MAVLink messages and commands",
             "",
-            "What a UAV accepts from the ground and sends to it. [Ground stations](../docs/ground-stations.md) says how",
-            "to connect, and what QGroundControl asks for. `ftcc commands` and `ftcc failures` print the same:",
+            "What a UAV accepts from the ground and sends to it. [Ground stations](../docs/ground-stations.md) says",
+            "how to connect, and what QGroundControl asks for. `ftcc commands` and `ftcc failures` print the same:",
             "",
             "    ftcc commands",
             "    ftcc failures demo",
@@ -174,8 +174,8 @@ def gains() -> str:
     """The gains of every scheme of this repository, and the settings of diagnosis."""
     sections = [
         "# Gains of the schemes\n\nThe monograph's value, the one that the form `flight` replaces it by, and the range"
-        ' beyond which a value is refused. "(not in paper)" marks what a form adds. A gain is set in a scenario, for one'
-        " flight, or in flight by its parameter:\n\n"
+        ' beyond which a value is refused. "(not in paper)" marks what a form adds. A gain is set in a scenario, for'
+        " one flight, or in flight by its parameter:\n\n"
         "    ftcc simulate containment --set gains.k11=5.0\n"
     ]
     headings = ("gain", "unit", "meaning", "monograph", "flight form", "range")
