@@ -24,14 +24,15 @@ def on_page_content(content: str, page: object, **_: object) -> str:
     """``content`` with MathML instead of LaTeX. What cannot be read is a warning, which ends a strict build."""
 
     def mathml(found: re.Match[str]) -> str:
-        latex = html.unescape(found[3]).strip()
+        # The converter knows `aligned` by its other name alone.
+        latex = html.unescape(found[3]).strip().replace("{aligned}", "{align*}")
         try:
             made = convert(latex, display="block" if found[2] == "[" else "inline")
         except Exception as error:  # the converter has no class for its errors
             _log.warning("%s: equation %r: %s", page, latex, error or type(error).__name__)
             return found[0]
-        if unknown := re.search(r"\\[a-zA-Z]+", made):
-            _log.warning("%s: equation %r: %s is no command that can be set", page, latex, unknown[0])
+        if unknown := re.search(r"\\[a-zA-Z]+|(?<=>)&(?=<)", made):
+            _log.warning("%s: equation %r: %s cannot be set", page, latex, unknown[0])
         return made
 
     return _EQUATION.sub(mathml, content)

@@ -151,14 +151,17 @@ def test_what_is_wrong_with_a_page_ends_the_build(
 
     def stage(folder: Path) -> Any:
         staged = build.Stage(folder)
-        staged.write("index.md", "# A\n\n[b](b.md)\n[c](#c)\n![d](d.png)\n\n$\\nonsense$, $\\left( 1$ and $\\alpha$\n")
+        equations = (
+            "$\\nonsense$, $\\left( 1$, $\\begin{odd}a & b\\end{odd}$, $\\begin{aligned}\\alpha & b\\end{aligned}$"
+        )
+        staged.write("index.md", f"# A\n\n[b](b.md)\n[c](#c)\n![d](d.png)\n\n{equations}\n")
         return staged
 
     monkeypatch.setattr(build, "stage", stage)
     with pytest.raises(MkDocsException):
         build.build_site(tmp_path / "site")
     said = capsys.readouterr().err
-    for fault in ("'b.md'", "'#c'", "'d.png'", "\\\\nonsense", "\\\\left( 1"):
+    for fault in ("'b.md'", "'#c'", "'d.png'", "\\\\nonsense", "\\\\left( 1", "{odd}"):
         assert fault in said, said
     assert "\\alpha" not in said
     assert "<mi>&#x003B1;</mi>" in (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
