@@ -32,10 +32,10 @@ MOVED = {"docs/welcome.md": "index.md", "README.md": "start.md"}
 """Pages that stand elsewhere on the site: it begins with the gallery."""
 PICTURES = {".png", ".svg", ".gif"}
 LANGUAGES = {".py": "python", ".pyi": "python", ".toml": "toml", ".yaml": "yaml", ".cff": "yaml", ".json": "json"}
-SCRIPTS = ("pictures.py", "gallery.py", "rooms.py")
-"""Which draw pictures in a minute or two."""
+SCRIPTS = ("pictures.py", "scheme_pages.py", "rooms.py")
+"""Which draw pictures within minutes."""
 LONG_SCRIPTS = ("active_studies.py", "closures.py", "diagnosis_figures.py")
-"""Fly thousands of flights: called by hand."""
+"""Measure for far longer: called by hand."""
 
 _FENCE = re.compile(r"(^```.*?^```|`[^`\n]+`)", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"(\]\(|^\[[^\]]+\]: )([^)\s#]+)(#[^)\s]*)?", re.MULTILINE)
