@@ -15,6 +15,8 @@ __all__ = ["MOST_UAVS", "Request"]
 
 MOST_UAVS = 200
 """As many as a scenario may have."""
+_LIKE = {"longitudinal": "containment", "attitude": "attitude_synchronization", "position": "fire_monitoring"}
+"""By plant the shipped scenario after which one for a law from elsewhere is made."""
 
 
 @dataclass(frozen=True)
@@ -87,15 +89,20 @@ class Request:
             )
         return wanted
 
-    def example(self) -> str:
-        """Return the name of the shipped scenario that flies the scheme, whose aircraft and rates are taken.
+    def example(self, scheme: Scheme) -> str:
+        """Return the name of the shipped scenario whose aircraft and rates are taken: the scheme's own, or one like it.
 
         Raises
         ------
         RequestError
-            If none does.
+            If none flies the scheme's plant.
         """
-        found = [name for name, path in shipped().items() if read(path)["scheme"] == self.scheme]
-        if not found:
-            raise RequestError(f"--scheme {self.scheme}: no shipped scenario flies it, whose aircraft it could take")
-        return self.scheme if self.scheme in found else found[0]
+        flown = {name: read(path)["scheme"] for name, path in shipped().items()}
+        if self.scheme in flown.values():
+            return next(name for name in (self.scheme, *flown) if flown.get(name) == self.scheme)
+        if scheme.plant not in _LIKE:
+            raise RequestError(
+                f"--scheme {self.scheme}: flies on plant {scheme.plant}, for which no scenario can be made; "
+                f"there are {', '.join(_LIKE)}"
+            )
+        return _LIKE[scheme.plant]

@@ -34,7 +34,7 @@ def text_of(
 
     ``command`` is what it was made by; ``measured`` the times to settle of the first flight, s, by claim.
     """
-    example = shipped()[request.example()].read_text(encoding="utf-8")
+    example = shipped()[request.example(scheme)].read_text(encoding="utf-8")
     tables = {"longitudinal": _flying, "attitude": _turning, "position": _round_a_fire}[scheme.plant]
     kept = _tables(example, _KEPT)
     if scheme.plant == "longitudinal":
