@@ -165,7 +165,7 @@ def stage(folder: Path) -> Stage:
         staged.page(page)
     for name, make in PAGES.items():
         staged.write(name, make())
-    for name in ("javascripts", "stylesheets"):
+    for name in ("fonts", "javascripts", "stylesheets"):
         shutil.copytree(ROOT / "docs" / name, folder / "docs" / name)
     return staged
 
