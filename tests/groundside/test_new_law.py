@@ -83,6 +83,7 @@ def test_its_tests_pass_and_it_flies_as_processes_bit_for_bit(site: Path, packag
     typed("pytest", "-q", "-p", "no:cacheprovider")
     cli, options = "ftcc.groundside.cli", ("--duration", "3", "--out")
     typed(cli, "verify", f"{NAME}.toml")
+    typed(cli, "new", "ten.toml", "--scheme", NAME, "--followers", "10", "--graph", "grid", "--faults", "2")
     typed(cli, "simulate", f"{NAME}.toml", *options, "simulated")
     typed(cli, "fly", f"{NAME}.toml", "--speed", "max", "--viewer", "none", "--mavlink", "none", *options, "flown")
     assert same_flight(package / "flown", package / "simulated")

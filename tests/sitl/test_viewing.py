@@ -95,7 +95,7 @@ def test_a_flight_in_lockstep_opens_with_its_blueprint(fly: Callable[..., Flight
     views = {view.name: view.view_class for view in state.views}
     assert views["Swarm"] == "TextDocument"
     assert views["Events"] == "TextLog"
-    assert next(kind for name, kind in views.items() if name.startswith("Swarm about")) == "3D"
+    assert next(kind for name, kind in views.items() if name.startswith("Swarm (")) == "3D"
     assert next(kind for name, kind in views.items() if name.startswith("Links")) == "2D"
     for plot in ("Altitude, m", "Altitude tracking error S1, m", "Thrust, N", "Elevator, rad", "Estimated disturbance"):
         assert next(kind for name, kind in views.items() if name.startswith(plot)) == "TimeSeries"

@@ -192,7 +192,7 @@ def test_a_process_that_dies_and_an_exception_are_rows(tmp_path: Path, monkeypat
         forget_schemes()
         versions.cache_clear()
     assert errors[:2] == [None, "its process died"]
-    assert errors[2].startswith("RuntimeError: k_c is 3 (deadly.py:")
+    assert re.search(r"deadly\.py:\d+: in step: RuntimeError: k_c is 3 \(UAV 1, t = 0 s\)$", errors[2])
     assert errors[3] is None
 
 
