@@ -36,14 +36,15 @@ def name(uav: int) -> str:
     return f"UAV {uav}"
 
 
-def label(uav: int, leads: bool, snapshot: Snapshot) -> str:
-    """Return the label of an aircraft: its name, and its faults or silence."""
+def label(uav: int, leads: bool, snapshot: Snapshot, brief: bool = False) -> str:
+    """Return the label of an aircraft: its name, and its faults or silence; ``brief`` leaves details to the table."""
     called = name(uav) + (" leader" if leads else "")
     state = snapshot.uavs.get(uav)
     if state is None:
         return f"{called}: no telemetry"
     broken = len(faulty_actuators(state))
-    trouble = describe_silence(state, snapshot) or (f"{broken} faults" if broken > 1 else describe_faults(state))
+    faults = f"{broken} faults" if broken > 1 else "fault" if broken and brief else describe_faults(state)
+    trouble = describe_silence(state, snapshot) or faults
     return f"{called}: {trouble}" if trouble else called
 
 

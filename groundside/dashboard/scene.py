@@ -185,7 +185,7 @@ class Scene:
         before = np.where(np.isfinite(before), before, after)
         entries += self._trails(t, before, after) + self._sticks(snapshot)
         for uav in self._detail.shown:
-            text = label(uav, uav in self._leaders, snapshot)
+            text = label(uav, uav in self._leaders, snapshot, brief=self._detail.crowded)
             if text != self._labels.get(uav):
                 self._labels[uav] = text
                 shown = rr.Points3D.from_fields(labels=text, show_labels=True)

@@ -235,9 +235,8 @@ def test_a_command_that_needs_no_swarm_ends_well(
     where: str, command: str, place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arguments = arguments_of(command)
-    if (
-        arguments[0] == "new"
-    ):  # Pages make the same: each in a folder of its own. Its scenario is there for what follows.
+    if arguments[0] == "new":
+        # Pages make the same: each in a folder of its own. Its scenario is there for what follows.
         with monkeypatch.context() as patch:
             patch.chdir(tmp_path)
             assert typed(arguments) == 0

@@ -104,7 +104,7 @@ def test_who_gets_into_trouble_comes_into_view(flown: Flown) -> None:
     troubled = [uav for uav, _ in BROKEN.values()]
     assert set(artists._detail.shown) - set(first) == {*troubled, SILENT[0]}
     label = values(entries[f"/world/uav/{troubled[0]}/label"][-1], "labels")
-    assert label == [f"UAV {troubled[0]}: elevator 60 %"]
+    assert label == [f"UAV {troubled[0]}: fault"]
     assert f"/world/uav/{troubled[0]}" in entries
     assert f"/world/uav/{ORDINARY}" not in entries
 
