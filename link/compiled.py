@@ -56,6 +56,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 cache_folder: Path = cache.folder()
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
+os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"  # what it says is read
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from numba.core import caching, types  # noqa: E402

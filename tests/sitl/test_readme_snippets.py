@@ -27,6 +27,7 @@ from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 from tests.sitl.conftest import FTCC, Flight
 from tests.support.guests import EXAMPLE, forget_schemes, install
+from tests.support.ports import free_port
 
 REPOSITORY = Path(__file__).parents[2]
 FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
@@ -226,6 +227,8 @@ def arguments_of(command: str) -> list[str]:
     more = SHORTER.get(words[0], [])
     if words[0] == "study":  # a draw has a seed of its own: one option or the other
         more = [*more, "--samples" if "--samples" in words or "--seeds" not in words else "--seeds", "2"]
+    if "--port" in words:
+        more = [*more, "--port", str(free_port())]  # that of the page may be another swarm's
     out = ["--out", f"out/{next(_OUT)}"] if words[0] in ("simulate", "fly", "study", "map", "search") else []
     return [*words, *more, *out]
 
