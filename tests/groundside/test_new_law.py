@@ -67,6 +67,7 @@ def test_its_law_is_complete_and_its_scenario_can_fly(
     finally:
         monkeypatch.undo()
         forget_schemes()
+        sys.modules.pop(NAME, None)
 
 
 @pytest.mark.slow
