@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import json
 import math
 import time
@@ -29,7 +30,7 @@ JSON_PERIOD = 1.0
 """Wall time between JSON lines of progress, s."""
 
 
-class FlightOutput:
+class FlightOutput(abc.ABC):
     """Prints a flight from its start to its verdict."""
 
     period: float
@@ -44,6 +45,7 @@ class FlightOutput:
     def __enter__(self) -> FlightOutput:
         return self
 
+    @abc.abstractmethod
     def __exit__(self, *_: object) -> None:
         """End the output of progress."""
 
@@ -58,21 +60,21 @@ class FlightOutput:
         """Print that all processes are ready, and where the dashboard is."""
         self.begun = time.monotonic()
 
+    @abc.abstractmethod
     def event(self, event: Event) -> None:
         """Print an event."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def progress(self, t: float, pace: Pace, late: int) -> None:
         """Print how far the flight is."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def not_ready(self, why: str) -> None:
         """Print why the flight did not begin."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def end(self, outcome: Outcome, wall: float, code: int) -> None:
         """Print the outcome of a flight of ``wall`` seconds and, if it is for programs, the exit code."""
-        raise NotImplementedError
 
 
 class TerminalOutput(FlightOutput):
@@ -155,6 +157,9 @@ class JsonOutput(FlightOutput):
     def __init__(self, mission: Mission, options: FlightOptions) -> None:
         super().__init__(mission, options)
         print_start(mission, options.folder)
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing to end: each line is complete."""
 
     def started(self, address: str | None) -> None:
         super().started(address)

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.drawn_airframe import SPAN, airframe, outline
-from ftcc.groundside.palette import Color
+from ftcc.groundside.palette import Color, hexadecimal
 from ftcc.link.rotation import body_attitude, body_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
 
-__all__ = ["ABOVE", "BEHIND", "BESIDE", "Fleet", "View", "axes_of"]
+__all__ = ["ABOVE", "BEHIND", "BESIDE", "Fleet", "View", "axes_of", "begin_tracks"]
 
 Array = NDArray[np.float64]
 
@@ -123,3 +124,11 @@ class Fleet:
     def _flat(self, points: Array, places: Array) -> Array:
         """Return points (n, k, 3) in north-east-down around ``places`` (n, 2) as pixels (n, k, 2)."""
         return np.stack([points @ self._view.right, points @ self._view.up], axis=-1) + places[:, None]
+
+
+def begin_tracks(axes: Axes, tints: Mapping[int, Color]) -> list[Line2D]:
+    """Return a line for the way behind each aircraft, empty as yet."""
+    return [
+        axes.plot([], [], color=hexadecimal(tint), linewidth=1.8, alpha=0.6, animated=True, zorder=4)[0]
+        for tint in tints.values()
+    ]

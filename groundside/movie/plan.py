@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.references.position import Command, border
 from ftcc.groundside.canvas import Line2D
-from ftcc.groundside.movie.aircraft import ABOVE, Fleet, axes_of
+from ftcc.groundside.movie.aircraft import ABOVE, Fleet, axes_of, begin_tracks
 from ftcc.groundside.movie.labels import Labels
 from ftcc.groundside.movie.sampling import Sampled
 from ftcc.groundside.movie.screen import Screen
@@ -53,10 +53,7 @@ class PlanScene:
         self._area = self._front = None
         if self._fire is not None:
             self._area, self._front = self._patch(0.18), self._patch(1.0, edge=True)
-        self._tracks = [
-            axes.plot([], [], color=hexadecimal(tint), linewidth=1.8, alpha=0.6, animated=True, zorder=4)[0]
-            for tint in tints.values()
-        ]
+        self._tracks = begin_tracks(axes, tints)
         self._marks = axes.scatter(
             [0.0] * len(uavs),
             [0.0] * len(uavs),

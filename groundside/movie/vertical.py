@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.movie.aircraft import BESIDE, Fleet, axes_of
+from ftcc.groundside.movie.aircraft import BESIDE, Fleet, axes_of, begin_tracks
 from ftcc.groundside.movie.labels import Labels
 from ftcc.groundside.movie.sampling import Sampled
 from ftcc.groundside.movie.screen import Screen
@@ -56,10 +56,7 @@ class VerticalScene:
         band = hexadecimal(GRAY)
         self._hull = self._patch(band, 0.16) if len(self._leaders) > 1 else None
         self._blocks = [self._patch(band, 0.55) for _ in self._obstacles]
-        self._trails = [
-            axes.plot([], [], color=hexadecimal(tint), linewidth=1.8, alpha=0.6, animated=True, zorder=4)[0]
-            for tint in tints.values()
-        ]
+        self._trails = begin_tracks(axes, tints)
         self._fleet = Fleet(axes, tints, BESIDE, _SPAN * screen.scale)
         self._labels = Labels(axes, tints, mission.graph.leaders, screen, 0.85 * _SPAN * screen.scale)
         axes.set(xlabel="along the track, from the swarm's mean, m", ylabel="altitude, m")
