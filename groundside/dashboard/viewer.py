@@ -129,7 +129,6 @@ class Viewer:
             query = f"url={urllib.parse.quote(self._url, safe='')}&hide_welcome_screen"
             self.address = f"http://{_LOOPBACK}:{page_port}/?{query}"
             options += ["--serve-web", "--web-viewer-port", str(inner_port), "--server-memory-limit", "256MB"]
-            options += ["--newest-first"]
         else:
             options += ["--memory-limit", "1GB", "--server-memory-limit", "64MB", "--hide-welcome-screen"]
             options += ["--expect-data-soon"] if recording is None else []
