@@ -20,7 +20,8 @@ COURSE_RATE = 0.3
 LARGEST_BANK = 0.5
 """rad."""
 ROLL_STIFFNESS = 40.0
-"""Bank error to roll acceleration, 1/s^2; the airframe's own roll damping does the rest."""
+"""Bank error to roll acceleration, at most, 1/s^2; the airframe's own roll damping does the rest. Where that is weak,
+as on a large aircraft, the stiffness is what it damps critically."""
 YAW_DAMPING = 0.2
 """Yaw rate beyond that of a coordinated turn to rudder, s."""
 LEAST_AIRSPEED = 8.0
@@ -35,7 +36,9 @@ def hold_course(own, course, model, command):
     bank = clip(math.atan(COURSE_RATE * away * V / model.g), -LARGEST_BANK, LARGEST_BANK)
     rolling = 0.5 * model.rho * V * V * model.S * model.b * model.Clda / model.Ix
     turning = model.g / V * math.sin(own.mu)
-    aileron = ROLL_STIFFNESS * wrapped(bank - own.mu) / rolling
+    damping = -0.25 * model.rho * V * model.S * model.b * model.b * model.Clp / model.Ix
+    stiffness = min(ROLL_STIFFNESS, 0.25 * damping * damping)
+    aileron = stiffness * wrapped(bank - own.mu) / rolling
     rudder = YAW_DAMPING * (own.r - turning)
     command[AILERON] = clip(aileron, model.aileron_min, model.aileron_max)
     command[RUDDER] = clip(rudder, model.rudder_min, model.rudder_max)

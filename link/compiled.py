@@ -31,6 +31,7 @@ __all__ = [
     "Room",
     "Vector",
     "cache_folder",
+    "call_by_address",
     "compiled",
     "compiled_apart",
     "compiled_to_wait",
@@ -59,11 +60,12 @@ os.environ["NUMBA_CACHE_DIR"] = str(cache_folder)
 os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"  # what it says is read
 
 import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
+from llvmlite import ir  # noqa: E402
 from numba.core import caching, types  # noqa: E402
 from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
-from numba.extending import overload  # noqa: E402
+from numba.extending import intrinsic, overload  # noqa: E402
 
 
 def compiled(function: F) -> F:
@@ -192,6 +194,19 @@ def external(name: str, result: str, *arguments: str) -> Any:
     Compiled functions that call it can be cached: its address is looked up when they are loaded.
     """
     return types.ExternalFunction(name, getattr(types, result)(*(getattr(types, one) for one in arguments)))
+
+
+@intrinsic
+def call_by_address(_context, address, first, second):
+    """In compiled code: call the C function ``void (int64, int64)`` at ``address``, see `callbacks`."""
+
+    def generate(context, builder, signature, arguments):
+        whole = ir.IntType(64)
+        kind = ir.FunctionType(ir.VoidType(), [whole, whole])
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), generate
 
 
 def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ftcc.sim.disturbances import Disturbance
 from ftcc.sim.faults import Fault
 from ftcc.sim.fleet import Fleet
 from ftcc.sim.injection import SPARE, inject
+from ftcc.sim.jsbsim.flight import Driven, start_models
 from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.obstacles import zones_of
 from ftcc.sim.plant import TRUTH
@@ -41,14 +43,25 @@ def _empty_table(specs: Sequence[VehicleSpec], name: str, width: int) -> NDArray
     return table
 
 
+def _driven_at_start(spec: VehicleSpec, plant: ModuleType) -> Sequence[float]:
+    """What a vehicle's external model gets at the start, see `Driven`; zeros without one."""
+    if spec.flown is None:
+        return (0.0,) * len(Driven._fields)
+    calm = plant.Disturbances(*(0.0,) * len(plant.DISTURBANCES))
+    begin = plant.State(*spec.initial), plant.Inputs(*spec.command), calm, plant.Parameters(*spec.airframe)
+    return tuple(plant.driven(*begin))
+
+
 def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
     """The fleet of ``specs``, which share one plant, before the first tick."""
     k = len(specs)
     plant = find(specs[0].plant)
     command = np.array([spec.command for spec in specs], np.float64)
     limits = np.array([spec.limits for spec in specs], np.float64)
+    state = np.array([spec.initial for spec in specs], np.float64)
+    driven = np.array([_driven_at_start(spec, plant) for spec in specs])
     fleet = Fleet(
-        state=np.array([spec.initial for spec in specs], np.float64),
+        state=state,
         position=np.clip(command, limits[:, :, 0], limits[:, :, 1]),
         command=command,
         acting=np.zeros((k, len(ACTUATORS))),
@@ -95,6 +108,8 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
         autothrottle=np.array([spec.autothrottle for spec in specs], np.float64),
         speed_hold=np.array([spec.autothrottle.thrust for spec in specs], np.float64),
         disturbed=np.zeros((k, len(plant.DISTURBANCES))),
+        driven=driven,
+        model=start_models([spec.flown for spec in specs], [spec.uav for spec in specs], state, driven),
     )
     for i, spec in enumerate(specs):
         planned: list[Fault | NavigationFault] = [*spec.faults, *spec.navigation_faults]

@@ -10,7 +10,8 @@ import math
 from typing import Any
 
 from ftcc.link.actuators import SLOT, encode_command
-from ftcc.link.compiled import compiled, compiled_apart, compiled_within, fields, fill, moved
+from ftcc.link.callbacks import call
+from ftcc.link.compiled import compiled, compiled_apart, compiled_within, fields, fill, moved, store
 from ftcc.link.messages import PositionTarget
 from ftcc.sim.actuation import IDLE, drive_of, has_autothrottle, hold_speed, stroke
 from ftcc.sim.actuation import actuate as plant_actuate
@@ -42,6 +43,8 @@ _SLOTS = tuple(SLOT[name] for name in plant.ACTUATORS)
 _CHANNELS = len(plant.DISTURBANCES)
 _MOVES = tuple(name for name, _ in plant.DISTURBANCES[-len(AIR) :]) == AIR
 """Whether the plant flies in air that may move."""
+_MODELLED = hasattr(plant, "driven")
+"""Whether an external model flies the vehicle: the plant's ``rates`` then move only what stands before the model."""
 _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
 
 
@@ -137,6 +140,23 @@ def _step(fleet, i, parameters, drives, d, h):
         x[j] += h / 6.0 * (r1[j] + 2.0 * r2[j] + 2.0 * r3[j] + r4[j])
 
 
+if _MODELLED:
+    _driven = plant.driven
+
+    @compiled
+    def _fly_model(fleet, i, d, parameters):
+        """Let the external model fly a step under the deflections and disturbances ``d`` of its end."""
+        acting = fields(_Inputs, fleet.deflection[i])
+        store(_driven(fields(_State, fleet.state[i]), acting, d, parameters), fleet.driven[i])
+        call(fleet.model[0], i, 0)
+
+else:
+
+    @compiled
+    def _fly_model(fleet, i, d, parameters):
+        """Nothing: the vehicle has no external model."""
+
+
 @compiled
 def advance(fleet, i, start_us, period_us, step_us):
     """Fly vehicle ``i`` for one period from ``start_us`` (us) with the command in force, in steps of ``step_us``.
@@ -164,6 +184,7 @@ def advance(fleet, i, start_us, period_us, step_us):
         if n == 0 or not same_disturbances:
             d = _disturbances(fleet, i, time)
         _step(fleet, i, parameters, drives, d, h)
+        _fly_model(fleet, i, d, parameters)
         if _MOVES and fleet.still[i] == 0:
             _blow(fleet, i, start_us // step_us + n + 1)
         why = _lost(fields(_State, fleet.state[i]), guards)

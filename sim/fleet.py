@@ -112,3 +112,7 @@ class Fleet(NamedTuple):
     """(k,): the thrust that it sets at present, N."""
     disturbed: NDArray[np.float64]
     """(k, d): room for the disturbances of a step."""
+    driven: NDArray[np.float64]
+    """(k, 7): what a vehicle's external model gets for a step, see ``jsbsim.flight.Driven``."""
+    model: NDArray[np.int64]
+    """(1,): address of the function that flies external models for a step, see ``link.callbacks``; 0 without any."""

@@ -3,6 +3,9 @@
 Shaped demands, an integral on the measured load factor, the kinematics (2.3) inverted for body rates, the moments
 (2.4)-(2.7) inverted for surfaces. Damping and stiffness terms use the commanded angle of attack and rates: cancelling
 the natural ones by measured values through the surfaces' lag would be unstable.
+
+The bandwidths are those of the reference airframe at 30 m/s, times a ``pace``: 1 there, and on another aircraft the
+ratio of the natural frequencies in pitch, see `pace_of`.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from typing import NamedTuple
 from ftcc.link.compiled import compiled
 from ftcc.link.rotation import wrapped
 
-__all__ = ["LoopState", "deflections", "load_factor", "loop_rates"]
+__all__ = ["LoopState", "deflections", "load_factor", "loop_rates", "pace_of"]
 
 _LOAD_FREQUENCY, _LOAD_DAMPING = 16.0, 0.7
 """Reference model of the load factor, rad/s."""
@@ -41,6 +44,17 @@ class LoopState(NamedTuple):
     """Of the load factor's error, s."""
 
 
+_PITCH_FREQUENCY = 12.2
+"""Of the reference airframe at 30 m/s, see `pace_of`, rad/s."""
+
+
+@compiled
+def pace_of(V, a):
+    """How fast an aircraft's loop may be against the one of the reference airframe: -Cma qbar S c / Iy, by its root."""
+    stiffness = max(-a.Cma, 0.0) * 0.5 * a.rho * V * V * a.S * a.c / a.Iy
+    return math.sqrt(stiffness) / _PITCH_FREQUENCY
+
+
 @compiled
 def _clip(value, low, high):
     return min(max(value, low), high)
@@ -54,23 +68,23 @@ def load_factor(V, alpha, elevator, thrust, a):
 
 
 @compiled
-def loop_rates(loop, wanted_load, wanted_bank, measured_load):
+def loop_rates(loop, wanted_load, wanted_bank, measured_load, pace):
     """Rates of `LoopState` for the demanded load factor and bank (rad)."""
     error = loop.n_r - measured_load
     integral_rate = error
     if abs(loop.integral) >= _MOST_INTEGRAL and loop.integral * error > 0.0:
         integral_rate = 0.0
-    w = _LOAD_FREQUENCY
+    w = _LOAD_FREQUENCY * pace
     return (
         loop.n_r_dot,
         w * w * (wanted_load - loop.n_r) - 2.0 * _LOAD_DAMPING * w * loop.n_r_dot,
-        _clip(wrapped(wanted_bank - loop.mu_r) / _BANK_TIME, -_BANK_RATE, _BANK_RATE),
-        integral_rate,
+        _clip(wrapped(wanted_bank - loop.mu_r) / _BANK_TIME * pace, -_BANK_RATE * pace, _BANK_RATE * pace),
+        integral_rate * pace,
     )
 
 
 @compiled
-def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gamma_dot, elevator, thrust, a):
+def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gamma_dot, elevator, thrust, pace, a):
     """Aileron, elevator and rudder (rad) that fly the loop's references.
 
     Parameters
@@ -86,6 +100,7 @@ def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gam
         Rates of the air path, eqs. (2.2), rad/s.
     elevator, thrust : float
         What acts at present, rad and N.
+    pace : float
     a : Airframe
     """
     pressure = 0.5 * a.rho * V * V * a.S
@@ -98,16 +113,16 @@ def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gam
     tan_b = sin_b / cos_b
     rolling = cos_b * (
         mu_r_dot
-        + _K_BANK * wrapped(loop.mu_r - mu)
+        + _K_BANK * pace * wrapped(loop.mu_r - mu)
         - chi_dot * (sin_g + cos_g * sin_m * tan_b)
         - gamma_dot * cos_m * tan_b
     )  # fmt: skip
-    slipping = -_K_SIDESLIP * beta - chi_dot * cos_g * cos_m + gamma_dot * sin_m
+    slipping = -_K_SIDESLIP * pace * beta - chi_dot * cos_g * cos_m + gamma_dot * sin_m
     p_c = cos_a * rolling + sin_a * slipping
     r_c = sin_a * rolling - cos_a * slipping
     q_c = (
         loop.n_r_dot * a.m * a.g / (pressure * a.CLa)
-        + _K_ALPHA * (alpha_d - alpha)
+        + _K_ALPHA * pace * (alpha_d - alpha)
         + tan_b * (p * cos_a + r * sin_a)
         + (chi_dot * cos_g * sin_m + gamma_dot * cos_m) / cos_b
     )
@@ -117,9 +132,9 @@ def deflections(loop, mu_r_dot, V, gamma, mu, alpha, beta, p, q, r, chi_dot, gam
     c1 = ((a.Iy - a.Iz) * a.Iz - a.Ixz * a.Ixz) / inertia
     c2 = a.Ixz * (a.Ix - a.Iy + a.Iz) / inertia
     c8 = (a.Ix * (a.Ix - a.Iy) + a.Ixz * a.Ixz) / inertia
-    p_d = _K_P * (p_c - p) - (c1 * r + c2 * p) * q
-    r_d = _K_R * (r_c - r) - (c8 * p - c2 * r) * q
-    q_d = _K_Q * (q_c - q) - ((a.Iz - a.Ix) * p * r - a.Ixz * (p * p - r * r)) / a.Iy
+    p_d = _K_P * pace * (p_c - p) - (c1 * r + c2 * p) * q
+    r_d = _K_R * pace * (r_c - r) - (c8 * p - c2 * r) * q
+    q_d = _K_Q * pace * (q_c - q) - ((a.Iz - a.Ix) * p * r - a.Ixz * (p * p - r * r)) / a.Iy
 
     # Moments, then surfaces, (2.6)-(2.7).
     pitching = q_d * a.Iy / (pressure * a.c)

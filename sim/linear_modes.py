@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftcc.sim.airframe import Airframe, attitude_rates
 from ftcc.sim.trim import trim
 
-__all__ = ["LATERAL", "LONGITUDINAL", "STATES", "Mode", "linearize", "modes"]
+__all__ = ["LATERAL", "LONGITUDINAL", "STATES", "Mode", "linearize", "modes", "modes_of"]
 
 STATES = ("V", "chi", "gamma", "mu", "alpha", "beta", "p", "q", "r")
 """Order of the linear model."""
@@ -77,7 +77,13 @@ def modes(airframe: Airframe, V: float) -> list[Mode]:
         If there is no level flight.
     """
     matrix = linearize(airframe, V)
-    pitch, turn = _roots(matrix, LONGITUDINAL), _roots(matrix, LATERAL)
+    parts = [[STATES.index(name) for name in names] for names in (LONGITUDINAL, LATERAL)]
+    return modes_of(*(matrix[np.ix_(part, part)] for part in parts))
+
+
+def modes_of(longitudinal: NDArray[np.float64], lateral: NDArray[np.float64]) -> list[Mode]:
+    """Modes of two linear models (4, 4), by name as `modes` has them."""
+    pitch, turn = _roots(longitudinal), _roots(lateral)
     found = [
         Mode(name, root) for name, roots in (("short period", pitch[:2]), ("phugoid", pitch[2:])) for root in roots
     ]
@@ -92,8 +98,7 @@ def modes(airframe: Airframe, V: float) -> list[Mode]:
     return [mode for mode in found if mode.eigenvalue.imag >= 0.0]
 
 
-def _roots(matrix: NDArray[np.float64], names: tuple[str, ...]) -> list[complex]:
-    """Eigenvalues of the part of the linear model in ``names``, fastest first."""
-    part = [STATES.index(name) for name in names]
-    roots = [complex(root) for root in np.linalg.eigvals(matrix[np.ix_(part, part)])]
+def _roots(matrix: NDArray[np.float64]) -> list[complex]:
+    """Eigenvalues of a linear model, fastest first."""
+    roots = [complex(root) for root in np.linalg.eigvals(matrix)]
     return sorted(roots, key=lambda root: (-round(abs(root), 9), -cmath.phase(root)))

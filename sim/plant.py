@@ -23,7 +23,7 @@ X, Y, Z, V, GAMMA, CHI, MU, ALPHA, BETA, THETA, P, Q, R = range(len(TRUTH))
 DIVERGED = 5
 """Key of `LOST`: a command, state or shared value of the law is not finite."""
 
-AIRSPEED, CLIMB, INCIDENCE, NUMBER, SIDESLIP = 1, 2, 3, 4, 6
+AIRSPEED, CLIMB, INCIDENCE, NUMBER, SIDESLIP, MODEL = 1, 2, 3, 4, 6, 7
 """Keys of `LOST` that a plant's ``lost`` returns."""
 
 LOST = {
@@ -34,6 +34,7 @@ LOST = {
     NUMBER: "state is not a number",
     DIVERGED: "control law gave a number that is not finite",
     SIDESLIP: "sideslip outside the model's valid range",
+    MODEL: "JSBSim can fly it no further",
 }
 """Why a vehicle ended, by code."""
 

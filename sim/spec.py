@@ -11,6 +11,7 @@ from ftcc.link.messages import PositionTarget
 from ftcc.sim.actuation import NO_AUTOTHROTTLE, Autothrottle
 from ftcc.sim.disturbances import CALM, Disturbance, Gust
 from ftcc.sim.faults import Fault
+from ftcc.sim.jsbsim.flight import FlownAircraft
 from ftcc.sim.navigation import NavigationFault
 from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.plant import TRUTH, Guards
@@ -69,6 +70,8 @@ class VehicleSpec:
     """Altitude from which that in the state message counts, m."""
     obstacles: tuple[Obstacle, ...] = ()
     """The same for all vehicles."""
+    flown: FlownAircraft | None = None
+    """The aircraft of JSBSim that flies, where the plant flies one."""
 
     @property
     def travel(self) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ import tomli_w
 
 from ftcc.airside.scheme import Scheme
 from ftcc.groundside.scenario.laws import mission_values_for_gains
-from ftcc.groundside.scenario.loading import Scenario
+from ftcc.groundside.scenario.loading import Scenario, airframe_file
 
 __all__ = ["as_flown"]
 
@@ -31,10 +31,16 @@ def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
 def as_flown(scenario: Scenario, scheme: Scheme) -> str:
     """Return the merged scenario with seed, versions and the value of every gain, as TOML.
 
-    A default that changes in a later version does not change this flight.
+    A default that changes in a later version does not change this flight. Files of the user's own stay where they are,
+    and are named by their full path.
     """
     document = {key: value for key, value in scenario.document.items() if key not in ("flown", "study")}
     document["seed"] = scenario.plan.seed
+    if (sheet := airframe_file(scenario.plan.airframe, scenario.file)).is_file():
+        document["airframe"] = str(sheet)
+    model = scenario.plan.plant.aircraft
+    if model is not None and model.endswith(".xml"):
+        document["plant"] = document["plant"] | {"aircraft": str((scenario.file.parent / model).resolve())}
     gains = document.get("gains", {})
     document["gains"] = gains | _all_gains(scenario, scheme)
     document["flown"] = {

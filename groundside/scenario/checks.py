@@ -96,12 +96,18 @@ def check_tracking(scheme: Scheme, columns: Sequence[str], findings: Findings) -
 def plant_of(plan: Plan, scheme: Scheme, findings: Findings) -> ModuleType:
     """Find the plant. Refuse one that the scheme cannot fly."""
     name = plan.plant.model or scheme.plant
+    if name == JSBSIM and scheme.plant in plants.find(GUIDED_JSBSIM).SERVES:
+        name = GUIDED_JSBSIM
     serving = [one for one in plants.names() if scheme.plant in plants.find(one).SERVES]
     if name not in serving:
         where = f"plant.model = {name!r}" if plan.plant.model else f"scheme = {scheme.name!r}"
         findings.refuse(f"{where}: no plant that scheme {scheme.name} can fly; there are {', '.join(serving)}")
         findings.stop_if_refused()
     return plants.find(name)
+
+
+JSBSIM, GUIDED_JSBSIM = "jsbsim", "jsbsim_guided"
+"""The plants that JSBSim flies: by surfaces, and under our inner loop. To a scenario both are ``model = "jsbsim"``."""
 
 
 def timing_of(plan: Plan, wire: bool, findings: Findings) -> Timing:
@@ -243,8 +249,10 @@ def require_followers(where: str, uavs: Iterable[int], plan: Plan, findings: Fin
             )
 
 
-def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[float, float], ...]:
-    """Return [lowest, highest] of each actuator, by slot; (0, 0) for one that the plant lacks.
+def limits_of(
+    plan: Plan, plant: ModuleType, lacking: Sequence[str], findings: Findings
+) -> tuple[tuple[float, float], ...]:
+    """Return [lowest, highest] of each actuator, by slot; (0, 0) for one that the plant, or its aircraft, lacks.
 
     Refuse any other field about an actuator that the plant lacks.
     """
@@ -253,7 +261,7 @@ def limits_of(plan: Plan, plant: ModuleType, findings: Findings) -> tuple[tuple[
     for name, slot in SLOT.items():
         given = getattr(plan.plant.limits, name)
         if name in actuators:
-            if given is None:
+            if given is None and name not in lacking:
                 findings.refuse(f"plant.limits.{name}: is missing")
             limits[slot] = given or (0.0, 0.0)
         elif given or getattr(plan.plant.lag, name) > 0.0 or getattr(plan.plant.rate_limits, name) < math.inf:

@@ -177,7 +177,8 @@ def trim_demands(
     times = times_to_check(plan, profiles, vehicle, fault.at, min(later, default=math.inf))
     for at, speed in [(t, v) for t in times for v in sorted(speeds_at(plan, profiles, fault.uav, t))]:
         acting = disturbances_at(vehicle, plant, at)
-        steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, f"faults.{n}", findings, **acting)
+        airframe = plant.Parameters(*vehicle.airframe)
+        steady = level_trim(plant, airframe, speed, f"faults.{n}", findings, vehicle.flown, **acting)
         yield TrimDemand(at, speed, steady.get(fault.actuator, 0.0), low, high)
 
 

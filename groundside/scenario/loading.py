@@ -31,6 +31,7 @@ from ftcc.groundside.schema import AirframeSheet, Plan, PointMassSheet
 __all__ = [
     "Scenario",
     "ScenarioError",
+    "airframe_file",
     "forms_and_variants",
     "load",
     "load_airframe",
@@ -215,12 +216,17 @@ def _with_inherited_claims(
     return validate(Plan, merged, path, places)
 
 
+def airframe_file(name_or_path: str, scenario_file: Path) -> Path:
+    """The file that a scenario means where it names no shipped airframe."""
+    return (scenario_file.parent / name_or_path).resolve()
+
+
 def load_airframe(
     name_or_path: str, scenario_file: Path, places: Places | None = None
 ) -> AirframeSheet | PointMassSheet:
     """The sheet of a shipped airframe, or of a path relative to the scenario's file."""
     sheets = shipped("airframes")
-    path = sheets.get(name_or_path, scenario_file.parent / name_or_path)
+    path = sheets.get(name_or_path) or airframe_file(name_or_path, scenario_file)
     if not path.is_file():
         there_are = f"there are {', '.join(sheets)}, or give a TOML file"
         raise located_error(

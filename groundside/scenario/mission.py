@@ -39,6 +39,7 @@ from ftcc.groundside.scenario.columns import leading_columns
 from ftcc.groundside.scenario.diagnosis import diagnosis_of, health_edges
 from ftcc.groundside.scenario.faults import TrimDemand, check_fault_times, check_faults, trim_demands
 from ftcc.groundside.scenario.fire import check_posts
+from ftcc.groundside.scenario.jsbsim import aircraft_of, lacking_actuators
 from ftcc.groundside.scenario.laws import check_scheme, gains_of, initial_shared_values
 from ftcc.groundside.scenario.leaders import check_clearance, limit_climb_rates, profiles_of
 from ftcc.groundside.scenario.links import link_changes
@@ -46,7 +47,7 @@ from ftcc.groundside.scenario.loading import Scenario, load_airframe
 from ftcc.groundside.scenario.references import own_references
 from ftcc.groundside.scenario.timeline import PlannedEvent, planned_events
 from ftcc.groundside.scenario.trims import check_starts, check_trims
-from ftcc.groundside.scenario.vehicles import nominal_model, true_airframe, vehicles_of
+from ftcc.groundside.scenario.vehicles import Flyable, nominal_model, true_airframe, vehicles_of
 from ftcc.groundside.scenario.wind import check_wind
 from ftcc.groundside.schema import AirframeSheet, Claim, Plan, PointMassSheet
 from ftcc.link.actuators import THRUST
@@ -54,6 +55,7 @@ from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
 from ftcc.link.timing import Timing
 from ftcc.sim.disturbances import CALM
+from ftcc.sim.jsbsim.aircraft import Aircraft
 from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import NO_TURBULENCE
@@ -141,9 +143,8 @@ def resolve(scenario: Scenario) -> Mission:
     profiles = profiles_of(plan, basis.graph, findings)
     findings.stop_if_refused()
     model = nominal_model(plan, basis.sheet, basis.limits)
-    vehicles = vehicles_of(
-        plan, basis.plant, basis.airframe, model, basis.limits, basis.graph, profiles, basis.timing, findings
-    )
+    aircraft = Flyable(basis.plant, basis.airframe, basis.limits, basis.aircraft)
+    vehicles = vehicles_of(plan, aircraft, model, basis.graph, profiles, basis.timing, findings)
     findings.stop_if_refused()
     gains = gains_of(scenario, basis.scheme, findings)
     _check_flyable(plan, basis, vehicles, profiles, references, gains, model, findings)
@@ -198,9 +199,8 @@ def trims_under_faults(scenario: Scenario) -> dict[int, tuple[TrimDemand, ...]]:
     profiles = profiles_of(plan, basis.graph, findings)
     findings.stop_if_refused()
     model = nominal_model(plan, basis.sheet, basis.limits)
-    vehicles = vehicles_of(
-        plan, basis.plant, basis.airframe, model, basis.limits, basis.graph, profiles, basis.timing, findings
-    )
+    aircraft = Flyable(basis.plant, basis.airframe, basis.limits, basis.aircraft)
+    vehicles = vehicles_of(plan, aircraft, model, basis.graph, profiles, basis.timing, findings)
     findings.stop_if_refused()
     faults = range(len(plan.faults)) if plan.fire is None else ()
     demands = {n: tuple(trim_demands(plan, basis.plant, vehicles, profiles, n, findings)) for n in faults}
@@ -220,6 +220,8 @@ class _Basis(NamedTuple):
     sheet: AirframeSheet | PointMassSheet
     airframe: tuple[float, ...]
     """The true parameters of the plant."""
+    aircraft: Aircraft | None
+    """The aircraft of JSBSim, where one flies."""
 
 
 def _basis(scenario: Scenario, findings: Findings) -> _Basis:
@@ -230,12 +232,13 @@ def _basis(scenario: Scenario, findings: Findings) -> _Basis:
     plant = plant_of(plan, scheme, findings)
     check_fault_times(plan, findings)
     check_wind(plan, plant, findings)
-    limits = limits_of(plan, plant, findings)
+    aircraft = aircraft_of(plan, plant, scenario.file, findings)
+    limits = limits_of(plan, plant, lacking_actuators(plan, aircraft, findings), findings)
     graph = graph_of(plan, scheme, findings)
     sheet = load_airframe(plan.airframe, scenario.file, scenario.places)
     airframe = true_airframe(plan, sheet, plant, findings)
     findings.stop_if_refused()
-    return _Basis(scheme, wire, timing, plant, limits, graph, sheet, airframe)
+    return _Basis(scheme, wire, timing, plant, limits, graph, sheet, airframe, aircraft)
 
 
 def _check_flyable(

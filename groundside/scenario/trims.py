@@ -15,6 +15,8 @@ from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.schema import Plan
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.sim import plants
+from ftcc.sim.jsbsim.aircraft import JsbsimError
+from ftcc.sim.jsbsim.flight import FlownAircraft
 from ftcc.sim.plant import AIRSPEED, CLIMB, INCIDENCE, LOST, SIDESLIP, TRUTH, UNITS
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.trim import TrimError
@@ -47,12 +49,19 @@ def truth_at_start(vehicle: VehicleSpec) -> NDArray[np.float64]:
 
 
 def level_trim(
-    plant: ModuleType, airframe: Any, V: float, where: str, findings: Findings, **disturbances: float
+    plant: ModuleType,
+    airframe: Any,
+    V: float,
+    where: str,
+    findings: Findings,
+    flown: FlownAircraft | None = None,
+    **disturbances: float,
 ) -> dict[str, float]:
     """Return the level trim at ``V`` (m/s) under disturbances, by actuator; refuse, and return {}, if there is none."""
+    model = {} if flown is None else {"flown": flown}
     try:
-        return dict(plant.level(airframe, V, **disturbances)._asdict())
-    except TrimError as error:
+        return dict(plant.level(airframe, V, **model, **disturbances)._asdict())
+    except (TrimError, JsbsimError) as error:
         findings.refuse(f"{where}: {error}")
         return {}
 
@@ -140,7 +149,9 @@ def _first_beyond_travel(
         for speed in sorted(speeds_at(plan, profiles, vehicle.uav, at)):
             where = f"UAV {vehicle.uav} at t = {at:g} s"
             acting = disturbances_at(vehicle, plant, at)
-            steady = level_trim(plant, plant.Parameters(*vehicle.airframe), speed, where, findings, **acting)
+            steady = level_trim(
+                plant, plant.Parameters(*vehicle.airframe), speed, where, findings, vehicle.flown, **acting
+            )
             for name in plant.ACTUATORS:
                 low, high = vehicle.limits[SLOT[name]]
                 if not low <= steady.get(name, low) <= high:

@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import ModuleType
+from typing import NamedTuple
 
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
 from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.scenario.faults import actuator_faults, navigation_faults
+from ftcc.groundside.scenario.jsbsim import flown_of
 from ftcc.groundside.scenario.trims import level_trim
 from ftcc.groundside.scenario.wind import discrete_gusts, gust, mean_wind, turbulence
 from ftcc.groundside.schema import AirframeSheet, Damping, Lag, Plan, PointMassSheet, RateLimits, record_of
@@ -23,31 +25,41 @@ from ftcc.sim import plants
 from ftcc.sim.actuation import NO_AUTOTHROTTLE, Autothrottle
 from ftcc.sim.airframe import scaled
 from ftcc.sim.disturbances import Disturbance
+from ftcc.sim.jsbsim.aircraft import Aircraft
 from ftcc.sim.obstacles import Obstacle
 from ftcc.sim.plant import TRUTH, Guards
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["nominal_model", "true_airframe", "vehicles_of"]
+__all__ = ["Flyable", "nominal_model", "true_airframe", "vehicles_of"]
 
 Limits = tuple[tuple[float, float], ...]
 """(lowest, highest) of each actuator, by slot."""
 
 
+class Flyable(NamedTuple):
+    """What all aircraft of a scenario have in common."""
+
+    plant: ModuleType
+    airframe: tuple[float, ...]
+    """The true parameters of the plant."""
+    limits: Limits
+    model: Aircraft | None
+    """The aircraft of JSBSim, where one flies."""
+
+
 def vehicles_of(
     plan: Plan,
-    plant: ModuleType,
-    airframe: tuple[float, ...],
+    flyable: Flyable,
     model: Model,
-    limits: Limits,
     graph: Graph,
     profiles: Mapping[int, Profile],
     timing: Timing,
     findings: Findings,
 ) -> list[VehicleSpec]:
     """Return the specs of the followers' aircraft, then of the leaders' reference points."""
-    code = _attitude_code(model, plant)
-    vehicles = [_aircraft(plan, uav, plant, airframe, limits, code, timing, findings) for uav in graph.followers]
-    vehicles += [_reference_point(plan, uav, plant, airframe, limits, profiles[uav]) for uav in graph.leaders]
+    code = _attitude_code(model, flyable.plant)
+    vehicles = [_aircraft(plan, uav, flyable, code, timing, findings) for uav in graph.followers]
+    vehicles += [_reference_point(plan, uav, flyable, profiles[uav]) for uav in graph.leaders]
     obstacles = tuple(Obstacle(*fields.x, fields.top) for fields in plan.obstacles)
     return [replace(vehicle, obstacles=obstacles, datum=plan.home.datum) for vehicle in vehicles]
 
@@ -95,13 +107,12 @@ def _by_slot(fields: Lag | RateLimits | Damping, plant: ModuleType) -> tuple[flo
 def _aircraft(
     plan: Plan,
     uav: int,
-    plant: ModuleType,
-    airframe: tuple[float, ...],
-    limits: Limits,
+    flyable: Flyable,
     code: AttitudeCode,
     timing: Timing,
     findings: Findings,
 ) -> VehicleSpec:
+    plant, airframe, limits, model = flyable
     own = plan.start.uav.get(uav)
     start: dict[str, float] = {}
     for name in plant.START:
@@ -114,7 +125,11 @@ def _aircraft(
             findings.refuse(f"start.{name}: is missing")
             start[name] = 1.0
     true = plant.Parameters(*airframe)
-    steady = level_trim(plant, true, start["V"], f"start of UAV {uav}", findings)
+    guided = bool(getattr(plant, "BY_ATTITUDE", False))
+    flown = None
+    if model is not None:
+        flown = flown_of(plan, model, start["V"], start["z"], timing.step_us, guided, findings)
+    steady = level_trim(plant, true, start["V"], f"start of UAV {uav}", findings, flown)
     initial = (math.nan,) * len(plant.State._fields)
     try:
         initial = tuple(plant.initial(start, steady)) if steady else initial
@@ -146,6 +161,7 @@ def _aircraft(
         guards=_guards(plan),
         offset=start.get("y", 0.0),
         autothrottle=NO_AUTOTHROTTLE if throttle is None else Autothrottle(**throttle.model_dump()),
+        flown=flown,
     )
 
 
@@ -180,14 +196,8 @@ def _guards(plan: Plan) -> Guards:
     return Guards(**{name: float(getattr(plan.plant.guards, name)) for name in Guards._fields})
 
 
-def _reference_point(
-    plan: Plan,
-    uav: int,
-    plant: ModuleType,
-    airframe: tuple[float, ...],
-    limits: Limits,
-    profile: Profile,
-) -> VehicleSpec:
+def _reference_point(plan: Plan, uav: int, flyable: Flyable, profile: Profile) -> VehicleSpec:
+    plant, airframe, limits, _ = flyable
     y = plan.leaders[uav].y
     return VehicleSpec(
         uav=uav,

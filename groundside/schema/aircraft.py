@@ -126,7 +126,15 @@ class AutothrottleFields(Strict):
 class Plant(Strict):
     """Options of the true aircraft."""
 
-    model: str | None = Field(None, description="name of the plant; default: the plant of the scheme")
+    model: str | None = Field(
+        None, description="name of the plant; default: the plant of the scheme; jsbsim: an aircraft of JSBSim flies"
+    )
+    aircraft: str | None = Field(
+        None, description="for model = jsbsim: an aircraft of the package jsbsim by name, or an XML file"
+    )
+    properties: dict[str, float] = Field(
+        {}, description="for model = jsbsim: JSBSim's properties that are set before the flight, by name"
+    )
     coefficients: dict[str, float] = Field(
         {}, description="factor on each true aerodynamic coefficient, by name; the laws' nominal model stays"
     )

@@ -48,6 +48,7 @@ __all__ = [
     "Parameters",
     "State",
     "airspeed",
+    "alpha_of",
     "complete",
     "initial",
     "level",
@@ -198,12 +199,12 @@ def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
     if "theta" in start:
         if "alpha" in start:
             raise ValueError("theta and alpha are both given; the one follows from the other")
-        alpha = _alpha_of(start["theta"], gamma, mu, beta)
+        alpha = alpha_of(start["theta"], gamma, mu, beta)
     free = {name: start.get(name, 0.0) for name in State._fields if name not in ("V", "z", "gamma", "alpha")}
     return State(V=start["V"], z=start["z"], gamma=gamma, alpha=alpha, **free)
 
 
-def _alpha_of(theta: float, gamma: float, mu: float, beta: float) -> float:
+def alpha_of(theta: float, gamma: float, mu: float, beta: float) -> float:
     """Angle of attack of an aircraft with that pitch: the inverse of `complete`."""
     if mu == beta == 0.0:
         return theta - gamma

@@ -54,6 +54,7 @@ __all__ = [
     "level",
     "lost",
     "rates",
+    "surface_rate",
     "truth",
 ]
 
@@ -123,7 +124,8 @@ def _against(s, vx, vy, vz):
 
 
 @compiled
-def _surface_rate(wanted, position):
+def surface_rate(wanted, position):
+    """Rate of a surface (rad/s) on its way from ``position`` to ``wanted`` (rad)."""
     stopped = min(max(wanted, -_SURFACE_STOP), _SURFACE_STOP)
     return min(max(_SURFACE_LAG * (stopped - position), -_SURFACE_RATE), _SURFACE_RATE)
 
@@ -147,10 +149,10 @@ def rates(s, u, d, a):
     north, east, up = acceleration(speed, gamma, chi, V_dot, gamma_dot, chi_dot)
     loop = LoopState(s.n_r, s.n_r_dot, s.mu_r, s.integral)
     n_r, n_r_dot, mu_r, integral = loop_rates(
-        loop, u.load_factor, u.bank, load_factor(speed, alpha, s.elevator, thrust, a)
+        loop, u.load_factor, u.bank, load_factor(speed, alpha, s.elevator, thrust, a), 1.0
     )
     aileron, elevator, rudder = deflections(
-        loop, mu_r, speed, gamma, mu, alpha, beta, s.p, s.q, s.r, chi_dot, gamma_dot, s.elevator, thrust, a
+        loop, mu_r, speed, gamma, mu, alpha, beta, s.p, s.q, s.r, chi_dot, gamma_dot, s.elevator, thrust, 1.0, a
     )
     return (
         s.vx,
@@ -166,9 +168,9 @@ def rates(s, u, d, a):
         p_dot,
         q_dot,
         r_dot,
-        _surface_rate(aileron, s.aileron),
-        _surface_rate(elevator, s.elevator),
-        _surface_rate(rudder, s.rudder),
+        surface_rate(aileron, s.aileron),
+        surface_rate(elevator, s.elevator),
+        surface_rate(rudder, s.rudder),
         n_r,
         n_r_dot,
         mu_r,
