@@ -13,11 +13,14 @@ from ftcc.groundside.cli.common import fail, terminal
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from ftcc.groundside.schema import AirframeSheet
     from ftcc.sim.linear_modes import Mode
     from ftcc.sim.trim import Trim
 
 __all__ = ["airframe"]
 
+_SPEEDS = (18.0, 22.0, 25.0, 30.0, 35.0)
+"""m/s, where nobody gives others."""
 _COLUMNS_TO_CHOOSE = 6
 """More airspeeds than this do not fit side by side."""
 
@@ -36,20 +39,32 @@ def airframe(
         ),
     ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the poles into this file.")] = None,
+    jsbsim: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write it as an aircraft for JSBSim into this folder.")
+    ] = None,
+    actuators: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENARIO",
+            help="Whose actuators the JSBSim aircraft has; default: no lag, surfaces +-30 deg, thrust 0 to T_max.",
+        ),
+    ] = None,
 ) -> None:
-    """Show level trim and linear modes of an airframe, with thrust and surfaces fixed."""
+    """Show level trim and linear modes of an airframe, with thrust and surfaces fixed; write it for JSBSim."""
     from ftcc.groundside.scenario import load_airframe
     from ftcc.groundside.schema import AirframeSheet, record_of
     from ftcc.sim.airframe import Airframe, scaled
     from ftcc.sim.linear_modes import modes
     from ftcc.sim.trim import TrimError, trim
 
-    speeds = airspeed or [18.0, 22.0, 25.0, 30.0, 35.0]
+    speeds = airspeed or [*_SPEEDS]
     for V in speeds:
         if not (math.isfinite(V) and V > 0.0):
             fail(f"--airspeed {V:g}: must be a positive number of m/s")
     if len(speeds) > _COLUMNS_TO_CHOOSE:
         fail(f"--airspeed: {len(speeds)} values; at most {_COLUMNS_TO_CHOOSE} fit side by side")
+    if actuators is not None and jsbsim is None:
+        fail("--actuators: is for the aircraft that --jsbsim DIR writes")
     sheet = load_airframe(name, Path("NAME"))
     if not isinstance(sheet, AirframeSheet):
         fail(f"airframe = {name!r}: is a point mass; it has no attitude to trim and no linear modes")
@@ -75,6 +90,27 @@ def airframe(
         except (OSError, ValueError) as error:
             fail(f"--plot {plot}: cannot be written: {error}")
         terminal(stderr=True).print(f"wrote {plot}", highlight=False, soft_wrap=True)
+    if jsbsim is not None:
+        scaled_sheet = sheet.model_copy(update=aircraft._asdict())
+        _write(scaled_sheet, Path(name).stem if Path(name).suffix else name, jsbsim, actuators, airspeed)
+
+
+def _write(sheet: AirframeSheet, name: str, folder: Path, scenario: str | None, airspeeds: list[float] | None) -> None:
+    """Write the JSBSim aircraft, with level flight at ``airspeeds``, or where its travel allows it."""
+    from ftcc.groundside.jsbsim import actuators_of, can_fly_level, write_aircraft
+    from ftcc.groundside.scenario import load
+
+    moved = actuators_of(None if scenario is None else load(scenario).plan, sheet.T_max)
+    speeds = airspeeds or [V for V in _SPEEDS if can_fly_level(sheet, moved, V)]
+    files = write_aircraft(sheet, name, folder, actuators=moved, airspeeds=speeds)
+    out = terminal(stderr=True)
+    of = "no lag, surfaces +-30 deg, thrust 0 to T_max" if scenario is None else f"those of {scenario}"
+    out.print(
+        f"wrote {files[0]} and {len(files) - 1} files beside it; actuators: {of}",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 def _factors(given: list[str]) -> dict[str, float]:

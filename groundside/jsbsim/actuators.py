@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ftcc.groundside.errors import UserError
 from ftcc.groundside.schema import Plan
 from ftcc.link.actuators import ACTUATORS
 
-__all__ = ["STANDARD_TRAVEL", "Actuator", "actuators_of"]
+__all__ = ["STANDARD_TRAVEL", "Actuator", "ActuatorError", "actuators_of"]
 
 STANDARD_TRAVEL = math.radians(30.0)
 """Of a surface whose travel nobody gives, to both sides, rad."""
+
+
+class ActuatorError(UserError):
+    """Actuators that cannot be written."""
 
 
 class Actuator(NamedTuple):
@@ -21,11 +26,9 @@ class Actuator(NamedTuple):
     """rad or N."""
     highest: float
     lag: float = 0.0
-    """Bandwidth, or with ``damping`` the natural frequency, rad/s; 0 = none."""
+    """Bandwidth of the first-order lag, rad/s; 0 = none."""
     rate: float = math.inf
     """rad/s or N/s."""
-    damping: float = 0.0
-    """Of a second-order actuator, below 1; 0 = first order."""
 
     @property
     def travel(self) -> float:
@@ -38,6 +41,11 @@ def actuators_of(plan: Plan | None, full_thrust: float) -> dict[str, Actuator]:
 
     Without a scenario there is no lag and no rate limit. A surface without a travel has `STANDARD_TRAVEL`, the engine
     one from 0 to ``full_thrust`` (N).
+
+    Raises
+    ------
+    ActuatorError
+        For actuators of second order: JSBSim's second-order filter starts at zero, wherever its command is.
     """
     standard = dict.fromkeys(ACTUATORS, (-STANDARD_TRAVEL, STANDARD_TRAVEL)) | {"thrust": (0.0, full_thrust)}
     if plan is None:
@@ -47,5 +55,9 @@ def actuators_of(plan: Plan | None, full_thrust: float) -> dict[str, Actuator]:
     for name, travel in standard.items():
         lowest, highest = getattr(plant.limits, name) or travel
         lag, rate, damping = (float(getattr(table, name)) for table in (plant.lag, plant.rate_limits, plant.damping))
-        found[name] = Actuator(float(lowest), float(highest), lag, rate, damping if lag > 0.0 else 0.0)
+        if damping > 0.0:
+            raise ActuatorError(
+                f"plant.damping.{name} = {damping:g}: must be 0; the actuators of a JSBSim aircraft are of first order"
+            )
+        found[name] = Actuator(float(lowest), float(highest), lag, rate)
     return found

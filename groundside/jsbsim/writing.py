@@ -16,11 +16,11 @@ from ftcc.link.actuators import ACTUATORS, unit_of
 from ftcc.link.airframe import Airframe, parameters
 from ftcc.sim.trim import TrimError, trim
 
-__all__ = ["AircraftError", "write_aircraft"]
+__all__ = ["AircraftError", "can_fly_level", "write_aircraft"]
 
 _TEMPLATES = Path(__file__).parent / "aircraft"
-_RADIUS = 1e9
-"""Of the planet, m: after 600 m its surface is 0.2 mm below the plane, and a position is exact to 0.1 um."""
+_RADIUS = 1e10
+"""Of the planet, m: its surface is 20 um below the plane after 600 m, and altitudes are exact to a micrometre."""
 _ALTITUDE = 1000.0
 """At the start, m."""
 
@@ -44,7 +44,7 @@ def write_aircraft(
     sheet : AirframeSheet
         A point mass has no moments, and is refused.
     name : str
-        Of the aircraft: letters, digits, ``_``, ``-`` and ``.``.
+        Of the aircraft: letters, digits, ``_``, ``.`` and single ``-``.
     folder : Path
         The folder of aircraft. In it ``name`` must not exist, or be an empty folder.
     actuators : mapping, optional
@@ -64,8 +64,8 @@ def write_aircraft(
     """
     if not isinstance(sheet, AirframeSheet):
         raise AircraftError(f"{name}: is a point mass; JSBSim flies aircraft with moments, inertia and surfaces")
-    if not re.fullmatch(r"\w[\w.-]*", name, flags=re.ASCII):
-        raise AircraftError(f"{name}: must be a name of letters, digits, _, - and ., such as reference_25kg")
+    if not re.fullmatch(r"\w[\w.]*(-[\w.]+)*", name, flags=re.ASCII):
+        raise AircraftError(f"{name}: must be a name of letters, digits, _, . and single -, such as reference_25kg")
     airframe, moved = record_of(sheet, Airframe), dict(actuators or actuators_of(None, sheet.T_max))
     words = _words(sheet, airframe, name, moved)
     try:
@@ -87,6 +87,15 @@ def write_aircraft(
     except OSError as error:
         raise AircraftError(f"{place}: cannot be written: {error.strerror or error}") from None
     return [place / file for file in texts]
+
+
+def can_fly_level(sheet: AirframeSheet, actuators: Mapping[str, Actuator], V: float) -> bool:
+    """Whether there is level flight at ``V`` (m/s) within the travel of these actuators."""
+    try:
+        _level(record_of(sheet, Airframe), sheet.T_max, V, actuators)
+    except TrimError:
+        return False
+    return True
 
 
 def _words(sheet: AirframeSheet, airframe: Airframe, name: str, actuators: Mapping[str, Actuator]) -> dict[str, Any]:
@@ -142,8 +151,6 @@ def _manner(name: str, moved: Actuator) -> str:
     travel = f"travel {moved.lowest:g} to {moved.highest:g} {unit}"
     if unit == "rad":
         travel += f" ({math.degrees(moved.lowest):.4g} to {math.degrees(moved.highest):.4g} deg)"
-    if moved.damping > 0.0:
-        return f"{travel}, second order, {moved.lag:g} rad/s, damping {moved.damping:g}"
     lag = f"lag {moved.lag:g} rad/s" if moved.lag > 0.0 else "no lag"
     return f"{travel}, {lag}, " + (f"at most {moved.rate:g} {unit}/s" if moved.rate < math.inf else "no rate limit")
 
