@@ -22,6 +22,7 @@ LABELS = {
     "dashboard": "live view",
     "results": "a run's folder",
     "generator": "scenarios in a line",
+    "jsbsim": "aircraft for JSBSim",
     "templates": "packages to begin with",
     "verdict": "how it went",
     "scenario": "files to specs",

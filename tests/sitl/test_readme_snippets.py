@@ -67,6 +67,7 @@ NOT_RUN = {
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "jsbsim --root=. --script=": "is JSBSim's: tests/groundside/jsbsim/test_referee.py",
     "docker": "needs a container engine",
     "ssh": "needs another computer",
     "scp": "needs another computer",

@@ -128,6 +128,11 @@ CASES = (
             Jump(2.0, "thrust", 30.0),
         ),
     ),
+    Case(
+        "roll of 360 deg, then a steep turn",
+        (Jump(1.0, "aileron", -0.7), Jump(4.0, "aileron", 0.7), Jump(1.0, "thrust", 40.0)),
+        V=30.0,
+    ),
     Case("wind of 5 m/s from the side", (Jump(1.0, "wind", 5.0),), chi=math.radians(60.0)),
     Case("1-cosine gust, 4 m/s upwards", gust=Gust(1.0, 1.0, 4.0)),
 )
@@ -231,7 +236,7 @@ def track_of(states: list[State]) -> Track:
 class Jsbsim:
     """An aircraft in JSBSim, in SI units and our names."""
 
-    def __init__(self, folder: Path, name: str, dt: float = DT, integrator: int = ADAMS_BASHFORTH_4) -> None:
+    def __init__(self, folder: Path, name: str, dt: float = DT, integrator: int | None = ADAMS_BASHFORTH_4) -> None:
         os.environ.setdefault("JSBSIM_DEBUG", "0")  # before the import: without its banners
         import jsbsim
 
@@ -240,7 +245,7 @@ class Jsbsim:
         self.fdm.set_dt(dt)  # before the model: its filters take the step when they are loaded
         if not self.fdm.load_model(name):
             raise ValueError(f"{folder / name}: JSBSim does not load it")
-        for of in ("rate", "position"):
+        for of in ("rate", "position") if integrator is not None else ():
             for motion in ("rotational", "translational"):
                 self.fdm[f"simulation/integrator/{of}/{motion}"] = integrator
 
@@ -308,7 +313,7 @@ def fly_jsbsim(
     folder: Path | None = None,
     actuators: Mapping[str, Actuator] = STILL,
     dt: float = DT,
-    integrator: int = ADAMS_BASHFORTH_4,
+    integrator: int | None = ADAMS_BASHFORTH_4,
     share: float = 0.5,
 ) -> Track:
     """Fly the aircraft of ``folder``, by default `aircraft_folder`, in JSBSim; ``share`` as in `Case.value`."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -132,6 +134,21 @@ def test_jsbsims_table_of_units_would_be_seen(tmp_path: Path) -> None:
     referee.write_in_si(tmp_path)
     found = apart(ours(TURN), referee.fly_jsbsim(TURN, folder=tmp_path))
     assert 10.0 * NEAR < found.position.max() < 0.1
+
+
+def test_jsbsims_own_program_flies_what_is_written(tmp_path: Path) -> None:
+    """``jsbsim --root=. --script=aircraft/NAME/fly_25.xml``."""
+    write_aircraft(SHEET, NAME, tmp_path / "aircraft", actuators=STILL, airspeeds=[25.0])
+    program = "import sys; from jsbsim.script import main; sys.exit(main())"
+    script = f"--script=aircraft/{NAME}/fly_25.xml"
+    flown = subprocess.run(
+        [sys.executable, "-c", program, "--root=.", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert flown.returncode == 0, flown.stdout + flown.stderr
+    rows = np.loadtxt(tmp_path / f"{NAME}_25.csv", delimiter=",", skiprows=1)
+    assert rows[-1, 0] == pytest.approx(20.0)
+    assert rows[:, 1] * referee.FOOT == pytest.approx(25.0, abs=1e-4)
+    assert rows[:, 4] == pytest.approx(1000.0, abs=1e-3)
 
 
 def test_it_starts_where_it_is_told_to() -> None:
