@@ -27,7 +27,7 @@ from ftcc.link.actuators import ACTUATORS  # noqa: E402
 from ftcc.link.airframe import Airframe  # noqa: E402
 from ftcc.sim.linear_modes import modes  # noqa: E402
 from ftcc.sim.trim import trim  # noqa: E402
-from tests.support import referee, referee_air  # noqa: E402
+from tests.support import referee, referee_air, referee_trim  # noqa: E402
 from tests.support.referee import AIRFRAME, CASES, NAME, SHEET, STILL, Apart, apart  # noqa: E402
 
 PICTURES = Path(__file__).parent / "pictures"
@@ -97,7 +97,7 @@ def trims_and_modes() -> None:
     """Print trim and modes side by side."""
     rows = []
     for V in SPEEDS:
-        mine, theirs = trim(AIRFRAME, V), referee.jsbsim_trim(V)
+        mine, theirs = trim(AIRFRAME, V), referee_trim.jsbsim_trim(V)
         off = max(abs(b / a - 1.0) for a, b in zip(mine, theirs, strict=True))
         rows.append(
             [
@@ -119,7 +119,7 @@ def trims_and_modes() -> None:
     table(heads, rows)
     rows = []
     for V in SPEEDS:
-        theirs = [complex(one) for one in np.linalg.eigvals(referee.jsbsim_matrix(V))]
+        theirs = [complex(one) for one in np.linalg.eigvals(referee_trim.jsbsim_matrix(V))]
         for mode in modes(AIRFRAME, V):
             near = min(theirs, key=lambda one: abs(one - mode.eigenvalue))
             off = 100.0 * abs(near - mode.eigenvalue) / abs(mode.eigenvalue)
@@ -214,8 +214,6 @@ def draw_turbulence(file: Path, steps: int) -> None:
         "JSBSim, Tustin": referee_air.jsbsim_air(referee_air.TUSTIN, steps, dt, altitude=altitude, wind=wind).speed,
         "JSBSim, Milspec": referee_air.jsbsim_air(referee_air.MILSPEC, steps, dt, altitude=altitude, wind=wind).speed,
     }
-    turning = referee_air.jsbsim_air(referee_air.TUSTIN, steps // 10, dt, altitude=altitude, wind=wind).turning
-    print("p, q, r of the air: " + ", ".join(f"{one:.2f}" for one in np.degrees(turning.std(axis=0))) + " deg/s\n")
     figure, axes = plt.subplots(2, 3, figsize=(7.2, 4.4), layout="constrained", sharex=True, height_ratios=(1.5, 1.0))
     edges = np.geomspace(0.02, 50.0, 32)
     rows = []
@@ -253,6 +251,28 @@ def draw_turbulence(file: Path, steps: int) -> None:
     write(figure, file)
 
 
+def rates_in_turbulence(flights: int) -> None:
+    """Print root mean squares of body rates in turbulence, with controls fixed, of both."""
+    place = {"altitude": 50.0, "wind": 10.0}
+    kinds = {"JSBSim, Tustin": referee_air.TUSTIN, "JSBSim, Milspec": referee_air.MILSPEC}
+    found = {"ours": [referee_air.our_rates(seed, 10.0, **place) for seed in range(1, flights + 1)]}
+    for name, kind in kinds.items():
+        found[name] = [referee_air.rates_of_jsbsim(kind, seed, 10.0, **place) for seed in range(1, flights + 1)]
+    with tempfile.TemporaryDirectory() as folder:
+        referee_air.write_for_air_that_does_not_turn(Path(folder))
+        found["JSBSim, Tustin, without turning air"] = [
+            referee_air.rates_of_jsbsim(referee_air.TUSTIN, seed, 10.0, **place, folder=Path(folder))
+            for seed in range(1, flights + 1)
+        ]
+    turning = referee_air.jsbsim_air(referee_air.TUSTIN, 100_000, 0.01, **place).turning.std(axis=0)
+    rows = [["p, q, r of JSBSim's air", *(f"{one:.2f}" for one in np.degrees(turning))]]
+    for name, flown in found.items():
+        squares = np.array([(one[200:] ** 2).mean(axis=0) for one in flown])
+        middle, spread = np.sqrt(squares.mean(axis=0)), np.sqrt(squares).std(axis=0) / math.sqrt(flights)
+        rows.append([name, *(f"{a:.2f} +- {2.0 * b:.2f}" for a, b in zip(np.degrees(middle), np.degrees(spread)))])
+    table(("root mean square, deg/s", "p", "q", "r"), rows)
+
+
 def write(figure: plt.Figure, file: Path) -> None:
     """Write a figure."""
     figure.savefig(file, metadata={"Date": None})
@@ -274,6 +294,7 @@ def main() -> None:
         trims_and_modes()
         draw_flight(given.out / "jsbsim_flight.svg")
         draw_steps(given.out / "jsbsim_steps.svg")
+        rates_in_turbulence(40)
         draw_turbulence(given.out / "jsbsim_turbulence.svg", given.steps)
 
 

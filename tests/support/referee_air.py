@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.groundside.jsbsim import write_aircraft
+from ftcc.groundside.scenario.wind import low_altitude
 from ftcc.link.compiled import compiled
 from ftcc.sim.build import build_fleet
 from ftcc.sim.fleet import Fleet
+from ftcc.sim.plants import cycle_of
+from ftcc.sim.plants.attitude import State
 from ftcc.sim.wind import Turbulence, blow, moving_air
 from tests.support import referee
 from tests.support.referee import FOOT
@@ -33,6 +39,35 @@ class Air(NamedTuple):
     """(n, 3): p, q, r of the air, rad/s."""
 
 
+def _in_the_field(
+    kind: int,
+    dt: float,
+    integrator: int,
+    altitude: float,
+    wind: float,
+    seed: int,
+    towards: float = 0.0,
+    folder: Path | None = None,
+) -> Any:
+    """JSBSim with our aircraft in level flight at `SPEED`, and its turbulence on."""
+    aircraft = referee.Jsbsim(folder or referee.aircraft_folder(), referee.NAME, dt, integrator)
+    steady, state = referee.start_of(referee.Case("", V=SPEED))
+    commands = {"aileron": 0.0, "elevator": steady.elevator, "rudder": 0.0, "thrust": steady.thrust}
+    aircraft.start(state._replace(z=altitude), referee.fractions(commands))
+    settings = {
+        "randomseed": seed,
+        # The mean wind says in which direction the field lies; a breath is enough.
+        "wind-north-fps": 1e-9 * math.cos(towards),
+        "wind-east-fps": 1e-9 * math.sin(towards),
+        "turbulence/milspec/windspeed_at_20ft_AGL-fps": wind / FOOT,
+        "turbulence/milspec/severity": 3.0,
+        "turb-type": kind,
+    }
+    for name, value in settings.items():
+        aircraft.fdm[f"atmosphere/{name}"] = value
+    return aircraft.fdm
+
+
 def jsbsim_air(
     kind: int,
     steps: int,
@@ -45,30 +80,57 @@ def jsbsim_air(
     V: float = 30.0,
 ) -> Air:
     """Turbulence of JSBSim at ``altitude`` (m) in ``wind`` (m/s, at 20 ft), which blows ``towards`` (rad)."""
-    aircraft = referee.Jsbsim(referee.aircraft_folder(), referee.NAME, dt, NO_INTEGRATOR)
-    steady, state = referee.start_of(referee.Case("", V=SPEED))
-    commands = {"aileron": 0.0, "elevator": steady.elevator, "rudder": 0.0, "thrust": steady.thrust}
-    aircraft.start(state._replace(z=altitude), referee.fractions(commands))
-    settings = {
-        "randomseed": 1,
-        # The mean wind says in which direction the field lies; a breath is enough.
-        "wind-north-fps": 1e-9 * math.cos(towards),
-        "wind-east-fps": 1e-9 * math.sin(towards),
-        "turbulence/milspec/windspeed_at_20ft_AGL-fps": wind / FOOT,
-        "turbulence/milspec/severity": 3.0,
-        "turb-type": kind,
-    }
-    for name, value in settings.items():
-        aircraft.fdm[f"atmosphere/{name}"] = value
+    fdm = _in_the_field(kind, dt, NO_INTEGRATOR, altitude, wind, 1, towards)
     names = [f"atmosphere/turb-{one}-fps" for one in ("north", "east", "down")]
     names += [f"atmosphere/{one}-turb-rad_sec" for one in "pqr"]
-    tree = aircraft.fdm.get_property_manager()
+    tree = fdm.get_property_manager()
     nodes = [tree.get_node(name) for name in names]
     rows = np.empty((steps, len(nodes)))
     for k in range(steps):
-        aircraft.fdm.run()
+        fdm.run()
         rows[k] = [node.get_double_value() for node in nodes]
     return Air(rows[:, :3] * [FOOT, FOOT, -FOOT], rows[:, 3:])
+
+
+def write_for_air_that_does_not_turn(folder: Path) -> None:
+    """Write the aircraft so that its damping follows its own rates, and not those against the air."""
+    (file, *_) = write_aircraft(referee.SHEET, referee.NAME, folder, actuators=referee.STILL)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r"velocities/([pqr])-aero-rad_sec", r"velocities/\1-rad_sec", text), encoding="utf-8")
+
+
+def rates_of_jsbsim(
+    kind: int, seed: int, seconds: float, *, altitude: float, wind: float, folder: Path | None = None
+) -> NDArray[np.float64]:
+    """Body rates p, q, r (n, 3), rad/s, every 10 ms, of JSBSim's aircraft with fixed controls in its turbulence."""
+    fdm = _in_the_field(kind, referee.DT, referee.ADAMS_BASHFORTH_4, altitude, wind, seed, folder=folder)
+    rows = []
+    for k in range(1, round(seconds / referee.DT) + 1):
+        fdm.run()
+        if k % 10 == 0:
+            rows.append([fdm[f"velocities/{one}-rad_sec"] for one in "pqr"])
+    return np.array(rows)
+
+
+def our_rates(seed: int, seconds: float, *, altitude: float, wind: float) -> NDArray[np.float64]:
+    """The same of our aircraft in our turbulence."""
+    deviation, length = low_altitude(wind, altitude)
+    along, right, up = (SPEED / one for one in length)
+    steady, level = referee.start_of(referee.Case("", V=SPEED))
+    spec = vehicle(
+        plant="attitude",
+        initial=level._replace(z=altitude),
+        command=(0.0, steady.elevator, 0.0, steady.thrust),
+        limits=tuple((one.lowest, one.highest) for one in referee.STILL.values()),
+        turbulence=Turbulence(deviation, (along, right, up), 1000, seed),
+    )
+    fleet, cycle = build_fleet([spec]), cycle_of("attitude")
+    rows = []
+    for k in range(round(100 * seconds)):
+        assert cycle.advance(fleet, 0, 10_000 * k, 10_000, 1000) == 0
+        state = State(*fleet.state[0].tolist())
+        rows.append([state.p, state.q, state.r])
+    return np.array(rows)
 
 
 @compiled

@@ -17,7 +17,7 @@ from ftcc.link.actuators import ACTUATORS
 from ftcc.link.airframe import Airframe
 from ftcc.sim.linear_modes import LATERAL, LONGITUDINAL, STATES, linearize
 from ftcc.sim.trim import trim
-from tests.support import referee
+from tests.support import referee, referee_trim
 from tests.support.referee import AIRFRAME, CASES, NAME, SHEET, STILL, Case, Jump, Track, apart, doublet
 
 pytestmark = pytest.mark.skipif(find_spec("jsbsim") is None, reason="JSBSim is not installed (extra jsbsim)")
@@ -73,7 +73,7 @@ def test_coefficients_that_are_zero_here_act_alike_elsewhere(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("V", [18.0, 25.0, 30.0, 35.0])
 def test_the_trim_is_where_jsbsims_accelerations_vanish(V: float) -> None:
-    assert referee.jsbsim_trim(V) == pytest.approx(trim(AIRFRAME, V), rel=1e-5)
+    assert referee_trim.jsbsim_trim(V) == pytest.approx(trim(AIRFRAME, V), rel=1e-5)
 
 
 @pytest.mark.parametrize("V", [18.0, 25.0, 30.0, 35.0])
@@ -84,7 +84,7 @@ def test_the_linear_modes_are_those_of_jsbsims_accelerations(V: float) -> None:
     for names in (LONGITUDINAL, LATERAL):
         part = [STATES.index(name) for name in names]
         mine += [complex(one) for one in np.linalg.eigvals(matrix[np.ix_(part, part)])]
-    theirs = [complex(one) for one in np.linalg.eigvals(referee.jsbsim_matrix(V))]
+    theirs = [complex(one) for one in np.linalg.eigvals(referee_trim.jsbsim_matrix(V))]
     for mode in mine:
         nearest = min(theirs, key=lambda one: abs(one - mode))
         assert nearest == pytest.approx(mode, rel=2e-5, abs=1e-6)
