@@ -11,24 +11,33 @@ import typer
 from ftcc.groundside.cli.common import fail, terminal
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rich.table import Table
 
     from ftcc.groundside.schema import AirframeSheet
+    from ftcc.sim.jsbsim.steady import Steady
     from ftcc.sim.linear_modes import Mode
     from ftcc.sim.trim import Trim
 
-__all__ = ["airframe"]
+__all__ = ["airframe", "shown_mode"]
 
 _SPEEDS = (18.0, 22.0, 25.0, 30.0, 35.0)
 """m/s, where nobody gives others."""
+_OF_JSBSIM = "jsbsim:"
+"""How the name of an aircraft of JSBSim begins."""
 _COLUMNS_TO_CHOOSE = 6
 """More airspeeds than this do not fit side by side."""
 
 
 def airframe(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Name of a bundled airframe, or a TOML file.")] = (
-        "reference_25kg"
-    ),
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="[NAME]",
+            help="Name of a bundled airframe, or a TOML file; jsbsim:NAME or jsbsim:FILE: an aircraft of JSBSim.",
+        ),
+    ] = "reference_25kg",
     airspeed: Annotated[
         list[float] | None, typer.Option(help="Airspeed, m/s; can be repeated; default: 18, 22, 25, 30 and 35.")
     ] = None,
@@ -38,6 +47,7 @@ def airframe(
             metavar="NAME=FACTOR", help="Multiply an aerodynamic coefficient, or all (all=FACTOR); can be repeated."
         ),
     ] = None,
+    altitude: Annotated[float, typer.Option(help="Altitude of an aircraft of JSBSim, m.")] = 1000.0,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the poles into this file.")] = None,
     jsbsim: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write it as an aircraft for JSBSim into this folder.")
@@ -65,6 +75,11 @@ def airframe(
         fail(f"--airspeed: {len(speeds)} values; at most {_COLUMNS_TO_CHOOSE} fit side by side")
     if actuators is not None and jsbsim is None:
         fail("--actuators: is for the aircraft that --jsbsim DIR writes")
+    if name.startswith(_OF_JSBSIM):
+        if coefficient or jsbsim is not None:
+            fail("--coefficient, --jsbsim: are for our airframes; JSBSim's aircraft have files of their own")
+        _show(*_of_jsbsim(name.removeprefix(_OF_JSBSIM), speeds, altitude), plot)
+        return
     sheet = load_airframe(name, Path("NAME"))
     if not isinstance(sheet, AirframeSheet):
         fail(f"airframe = {name!r}: is a point mass; it has no attitude to trim and no linear modes")
@@ -78,21 +93,48 @@ def airframe(
     except TrimError as error:
         fail(f"--airspeed: {error}")
     found = {V: modes(aircraft, V) for V in speeds}
+    _show(sheet.title or name, levels, found, plot)
+    if jsbsim is not None:
+        scaled_sheet = sheet.model_copy(update=aircraft._asdict())
+        _write(scaled_sheet, Path(name).stem if Path(name).suffix else name, jsbsim, actuators, airspeed)
+
+
+def _show(title: str, levels: Mapping[float, Trim | Steady], found: dict[float, list[Mode]], plot: Path | None) -> None:
+    """Print trims and modes by airspeed, and draw the modes."""
     out = terminal()
-    out.print(sheet.title or name, highlight=False)
+    out.print(title, highlight=False)
     out.print()
     out.print(_trims(levels))
     out.print()
     out.print(_modes(found))
     if plot is not None:
         try:
-            _draw(found, sheet.title or name, plot)
+            _draw(found, title, plot)
         except (OSError, ValueError) as error:
             fail(f"--plot {plot}: cannot be written: {error}")
         terminal(stderr=True).print(f"wrote {plot}", highlight=False, soft_wrap=True)
-    if jsbsim is not None:
-        scaled_sheet = sheet.model_copy(update=aircraft._asdict())
-        _write(scaled_sheet, Path(name).stem if Path(name).suffix else name, jsbsim, actuators, airspeed)
+
+
+def _of_jsbsim(
+    name: str, speeds: list[float], altitude: float
+) -> tuple[str, dict[float, Steady], dict[float, list[Mode]]]:
+    """Return title, level flights and modes of an aircraft of JSBSim."""
+    from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError
+    from ftcc.sim.jsbsim.controls import controls_of
+    from ftcc.sim.jsbsim.linear import linear_modes
+    from ftcc.sim.jsbsim.steady import steady_flight
+    from ftcc.sim.trim import TrimError
+
+    if not math.isfinite(altitude):
+        fail(f"--altitude {altitude:g}: must be a number of m")
+    aircraft = Aircraft(name)
+    try:
+        controls = {V: controls_of(aircraft, V, altitude) for V in speeds}
+        levels = {V: steady_flight(aircraft, controls[V], V, altitude) for V in speeds}
+        found = {V: linear_modes(aircraft, controls[V], V, altitude) for V in speeds}
+    except (JsbsimError, TrimError) as error:
+        fail(str(error))
+    return f"{aircraft.title} of JSBSim at {altitude:g} m", levels, found
 
 
 def _write(sheet: AirframeSheet, name: str, folder: Path, scenario: str | None, airspeeds: list[float] | None) -> None:
@@ -135,7 +177,7 @@ def _table(heading: str) -> Table:
     return made
 
 
-def _trims(levels: dict[float, Trim]) -> Table:
+def _trims(levels: Mapping[float, Trim | Steady]) -> Table:
     """A row per airspeed."""
     table = _table("V, m/s")
     for heading in ("alpha, rad", "deg", "elevator, rad", "deg", "thrust, N"):
@@ -158,14 +200,15 @@ def _modes(found: dict[float, list[Mode]]) -> Table:
     for V in found:
         table.add_column(f"{V:g} m/s", justify="right")
     for name in dict.fromkeys(mode.name for modes in found.values() for mode in modes):
-        cells = [[_shown(mode) for mode in modes if mode.name == name] for modes in found.values()]
+        cells = [[shown_mode(mode) for mode in modes if mode.name == name] for modes in found.values()]
         alike = [mode for modes in found.values() for mode in modes if mode.name == name]
         unit = "wn rad/s, zeta" if all(mode.oscillates for mode in alike) else "1/s"
         table.add_row(f"{name} {unit}", *("; ".join(cell) for cell in cells))
     return table
 
 
-def _shown(mode: Mode) -> str:
+def shown_mode(mode: Mode) -> str:
+    """Return frequency (rad/s) and damping of a mode, or its real eigenvalue (1/s)."""
     return f"{mode.frequency:.3f}, {mode.damping:.3f}" if mode.oscillates else f"{mode.eigenvalue.real:+.4f}"
 
 

@@ -16,6 +16,7 @@ EXAMPLES = {
     "ftcc search": "ftcc search demo --over 'channel.loss=uniform(low=0, high=.9)'",
     "ftcc calibrate": "ftcc calibrate containment --hours 20",
     "ftcc airframe": "ftcc airframe --airspeed 25 --airspeed 30 --coefficient CLde=1.1",
+    "ftcc identify": "ftcc identify c172p --airspeed 50 --gains containment",
     "ftcc fly": "ftcc fly containment --speed 5 --viewer none --duration 60",
     "ftcc ps": "ftcc ps",
     "ftcc stop": "ftcc stop --all",

@@ -1,4 +1,4 @@
-"""Our aircraft for JSBSim: an airframe sheet written as an aircraft that JSBSim flies."""
+"""Our airframe sheets as aircraft for JSBSim, and JSBSim's aircraft as airframe sheets."""
 
 import lazy_loader
 

@@ -2,6 +2,13 @@ from .actuators import STANDARD_TRAVEL as STANDARD_TRAVEL
 from .actuators import Actuator as Actuator
 from .actuators import ActuatorError as ActuatorError
 from .actuators import actuators_of as actuators_of
+from .fit_figure import draw_fit as draw_fit
+from .identification import Identified as Identified
+from .identification import identify as identify
+from .scaling import Scale as Scale
+from .scaling import scale_of as scale_of
+from .scaling import scaled_gains as scaled_gains
+from .sheet import sheet_text as sheet_text
 from .writing import AircraftError as AircraftError
 from .writing import can_fly_level as can_fly_level
 from .writing import write_aircraft as write_aircraft

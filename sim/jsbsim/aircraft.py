@@ -122,6 +122,7 @@ def load(aircraft: Aircraft, step_us: int = 5000) -> jsbsim.FGFDMExec:
         root.remove(element)
     said = _listen(package())
     model: jsbsim.FGFDMExec = package().FGFDMExec(None)
+    model.set_dt(step_us / 1e6 / parts_of(step_us))  # before it is loaded: its filters take the step then
     with tempfile.TemporaryDirectory(prefix="ftcc-") as folder:
         # JSBSim reads FOLDER/NAME/NAME.xml, and what it refers to beside it.
         home = Path(folder) / file.stem
@@ -137,7 +138,6 @@ def load(aircraft: Aircraft, step_us: int = 5000) -> jsbsim.FGFDMExec:
             raise JsbsimError(f"{aircraft.name}: {_one_line(str(error), folder)}") from error
     if not loaded:
         raise JsbsimError(f"{aircraft.name}: {_one_line(said.last, folder) or 'JSBSim cannot load it'}")
-    model.set_dt(step_us / 1e6 / parts_of(step_us))
     for name, value in aircraft.properties:
         if not model.get_property_manager().hasNode(name):
             raise JsbsimError(f"{aircraft.name}: has no property {name}")

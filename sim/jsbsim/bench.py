@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, JsbsimError, load
@@ -17,16 +17,20 @@ __all__ = [
     "Bench",
     "Commands",
     "Pose",
-    "bench_of",
     "prepare",
     "set_commands",
     "start_engines",
+    "throttles_of",
 ]
 
 THROTTLE = "fcs/throttle-cmd-norm"
 _SURFACES = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm")
 POUND = 4.4482216152605
 """N."""
+
+
+_SETTLING = 4
+"""Evaluations in which accelerations agree with the forces that depend on them, such as those by a rate of alpha."""
 
 
 class Pose(NamedTuple):
@@ -73,12 +77,19 @@ def engines_of(model: jsbsim.FGFDMExec) -> int:
     return int(model.get_propulsion().get_num_engines())
 
 
+def throttles_of(model: jsbsim.FGFDMExec) -> list[str]:
+    """Return the properties of an aircraft's throttles: one per engine, or one that drives an external force."""
+    engines = engines_of(model)
+    alone = [THROTTLE] if model.get_property_manager().hasNode(THROTTLE) else []
+    return [f"{THROTTLE}[{n}]" for n in range(engines)] if engines else alone
+
+
 def set_commands(model: jsbsim.FGFDMExec, commands: Commands) -> None:
     """Put commands into force."""
     for name, value in zip(_SURFACES, commands, strict=False):
         model[name] = value
-    for n in range(engines_of(model)):
-        model[f"{THROTTLE}[{n}]"] = commands.throttle
+    for throttle in throttles_of(model):
+        model[throttle] = commands.throttle
 
 
 def prepare(model: jsbsim.FGFDMExec) -> None:
@@ -100,18 +111,18 @@ def start_engines(model: jsbsim.FGFDMExec) -> None:
     model.run()
     if engines_of(model):
         model.get_propulsion().get_steady_state()
-    model.run()
+    for _ in range(_SETTLING):
+        model.run()
     model.set_trim_status(False)
     model.resume_integration()
 
 
 class Bench:
-    """An aircraft on the bench."""
+    """An aircraft on the bench; each measurement takes a fresh one, as engines remember how warm they were."""
 
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft
         self.model = load(aircraft)
-        self.engines = engines_of(self.model)
         prepare(self.model)
         for name, value in aircraft.properties:
             self.model[name] = value
@@ -125,13 +136,17 @@ class Bench:
             If JSBSim fails there.
         """
         model = self.model
+        ca, sa, cb, sb = math.cos(pose.alpha), math.sin(pose.alpha), math.cos(pose.beta), math.sin(pose.beta)
+        u, v, w = pose.V * ca * cb, pose.V * sb, pose.V * sa * cb
+        # Pitch from path and wind angles: sin(gamma) V = u sin(theta) - (v sin(phi) + w cos(phi)) cos(theta).
+        across = v * math.sin(pose.bank) + w * math.cos(pose.bank)
+        climb = pose.V * math.sin(pose.gamma) / math.hypot(u, across)
         model["ic/lat-geod-deg"], model["ic/long-gc-deg"] = 0.0, 0.0
         model["ic/h-sl-ft"] = pose.altitude / FOOT
-        model["ic/psi-true-deg"] = 0.0
-        model["ic/vt-fps"] = pose.V / FOOT
-        model["ic/phi-rad"] = pose.bank
-        model["ic/alpha-rad"], model["ic/beta-rad"] = pose.alpha, pose.beta
-        model["ic/gamma-rad"] = pose.gamma
+        model["ic/vw-mag-fps"] = 0.0  # JSBSim otherwise takes rounding, and more, for wind
+        model["ic/phi-rad"], model["ic/psi-true-rad"] = pose.bank, 0.0
+        model["ic/theta-rad"] = math.asin(min(max(climb, -1.0), 1.0)) + math.atan2(across, u)
+        model["ic/u-fps"], model["ic/v-fps"], model["ic/w-fps"] = u / FOOT, v / FOOT, w / FOOT
         model["ic/p-rad_sec"], model["ic/q-rad_sec"], model["ic/r-rad_sec"] = pose.p, pose.q, pose.r
         set_commands(model, commands)
         try:
@@ -149,15 +164,9 @@ class Bench:
         )
 
     def thrust(self) -> float:
-        """Return the engines' force along the body x axis, N."""
-        return float(self.model["forces/fbx-prop-lbs"]) * POUND if self.engines else 0.0
+        """Return the force of engines, or of what stands for one, along the body x axis, N."""
+        return sum(self.read(f"forces/fbx-{part}-lbs") or 0.0 for part in ("prop", "external")) * POUND
 
     def read(self, name: str) -> float | None:
         """Return a property; None if the aircraft has none of that name."""
         return float(self.model[name]) if self.model.get_property_manager().hasNode(name) else None
-
-
-@functools.cache
-def bench_of(aircraft: Aircraft) -> Bench:
-    """Return the bench of an aircraft; raises `JsbsimError` if it cannot be loaded."""
-    return Bench(aircraft)

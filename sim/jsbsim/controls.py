@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError
-from ftcc.sim.jsbsim.bench import Bench, Commands, Pose, bench_of
+from ftcc.sim.jsbsim.bench import Bench, Commands, Pose, throttles_of
 
 __all__ = ["NO_CONTROL", "Control", "Controls", "controls_of"]
 
@@ -93,7 +93,7 @@ def controls_of(aircraft: Aircraft, V: float, altitude: float) -> Controls:
     JsbsimError
         If JSBSim fails there.
     """
-    bench = bench_of(aircraft)
+    bench = Bench(aircraft)
     surfaces = {name: _surface(bench, name, V, altitude) for name in _AXIS}
     return Controls(**surfaces, thrust=_thrust(bench, V, altitude))
 
@@ -135,7 +135,7 @@ def _monotone(effects: np.ndarray) -> list[int]:
 
 
 def _thrust(bench: Bench, V: float, altitude: float) -> Control:
-    if not bench.engines:
+    if not throttles_of(bench.model):
         return NO_CONTROL
     throttles = np.linspace(0.0, 1.0, _SAMPLES)
     forces = []

@@ -138,7 +138,11 @@ class Modelled:
         model["ic/phi-rad"], model["ic/theta-rad"], model["ic/psi-true-rad"] = phi, theta, psi
         model["ic/vn-fps"], model["ic/ve-fps"], model["ic/vd-fps"] = s.vx / FOOT, s.vy / FOOT, -s.vz / FOOT
         model["ic/p-rad_sec"], model["ic/q-rad_sec"], model["ic/r-rad_sec"] = s.p, s.q, s.r
-        set_commands(model, self.controls.commands(*driven[:4].tolist()))
+        at_start = Driven(*driven.tolist())
+        set_commands(
+            model,
+            self.controls.commands(at_start.aileron, at_start.elevator, at_start.rudder, at_start.thrust),
+        )
         model.run_ic()
         start_engines(model)
         state[: len(ModelState._fields)] = self.motion()

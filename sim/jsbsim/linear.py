@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.sim.jsbsim.aircraft import Aircraft
-from ftcc.sim.jsbsim.bench import Bench, Commands, Pose, bench_of
+from ftcc.sim.jsbsim.bench import Bench, Commands, Pose
 from ftcc.sim.jsbsim.controls import Controls
 from ftcc.sim.jsbsim.steady import steady_flight
 from ftcc.sim.linear_modes import Mode, modes_of
 
 __all__ = ["linear_modes"]
 
-_STATES = ("u", "w", "q", "theta", "v", "p", "r", "phi")
+_LONGITUDINAL, _LATERAL = ("u", "w", "q", "theta"), ("v", "p", "r", "phi")
+_STATES = (*_LONGITUDINAL, *_LATERAL)
 _STEP = {"u": 0.1, "v": 0.1, "w": 0.1}
 """Of the central differences, m/s; of angles and rates, rad and rad/s:"""
 _TURN = 1e-3
@@ -32,7 +33,7 @@ def linear_modes(aircraft: Aircraft, controls: Controls, V: float, altitude: flo
         If there is no level flight.
     """
     steady = steady_flight(aircraft, controls, V, altitude)
-    bench = bench_of(aircraft)
+    bench = Bench(aircraft)
     commands = controls.commands(steady.aileron, steady.elevator, steady.rudder, steady.thrust)
     at = {
         "u": V * math.cos(steady.alpha), "v": 0.0, "w": V * math.sin(steady.alpha),
@@ -44,7 +45,8 @@ def linear_modes(aircraft: Aircraft, controls: Controls, V: float, altitude: flo
         more = _rates(bench, at | {name: at[name] + step}, altitude, commands)
         less = _rates(bench, at | {name: at[name] - step}, altitude, commands)
         matrix[:, n] = (more - less) / (2.0 * step)
-    return modes_of(matrix[:4, :4], matrix[4:, 4:])
+    border = len(_LONGITUDINAL)
+    return modes_of(matrix[:border, :border], matrix[border:, border:])
 
 
 def _rates(bench: Bench, state: dict[str, float], altitude: float, commands: Commands) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.sim.jsbsim.aircraft import Aircraft
-from ftcc.sim.jsbsim.bench import Commands, Pose, bench_of
+from ftcc.sim.jsbsim.bench import Bench, Commands, Pose
 from ftcc.sim.jsbsim.controls import Controls
 from ftcc.sim.trim import TrimError
 
@@ -49,7 +49,7 @@ def steady_flight(aircraft: Aircraft, controls: Controls, V: float, altitude: fl
     """
     from scipy.optimize import root  # takes longer to import than all else here
 
-    bench = bench_of(aircraft)
+    bench = Bench(aircraft)
     surfaces = [name for name in ("elevator", "thrust", "aileron", "rudder") if name not in controls.missing]
     free = ["alpha", *surfaces, *(["bank"] if "aileron" in surfaces or "rudder" in surfaces else [])]
     balance = ["w_dot", *(_BALANCES[name] for name in surfaces), *(["v_dot"] if "bank" in free else [])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from ftcc.groundside.simulation import simulate
 from ftcc.groundside.simulation.cases import load_case
 from ftcc.groundside.verdict import VERDICT_FILE
 from tests.sitl.conftest import Flight, events, same_flight
+
+needs_jsbsim = pytest.mark.skipif(importlib.util.find_spec("jsbsim") is None, reason="JSBSim is not installed")
 
 
 @pytest.mark.parametrize(
@@ -24,8 +27,20 @@ from tests.sitl.conftest import Flight, events, same_flight
         ("directed_attitude", ("loss_30", "delay_20"), 15.0),
         ("fire_monitoring", ("loss30",), 15.0),
         ("fire_monitoring_sixdof", ("loss30",), 15.0),
+        pytest.param("jsbsim_containment", ("loss30",), 12.0, marks=needs_jsbsim),
     ],
-    ids=["chapter 3", "chapter 4", "chapter 6", "chapter 7", "chapter 8", "chapter 9", "chapter 9 by attitude targets"],
+    ids=[
+        *(
+            "chapter 3",
+            "chapter 4",
+            "chapter 6",
+            "chapter 7",
+            "chapter 8",
+            "chapter 9",
+            "chapter 9 by attitude targets",
+        ),
+        *("chapter 5 on JSBSim's Cessna", "chapter 9 on its 737"),
+    ],
 )
 def test_processes_equal_the_simulation(
     scenario: str, variants: tuple[str, ...], duration: float, fly: Callable[..., Flight], tmp_path: Path
