@@ -10,12 +10,13 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["CHANNEL", "GUST", "NOISE", "TURBULENCE", "gaussian_pair", "philox", "uniform"]
+__all__ = ["CHANNEL", "DOOR", "GUST", "NOISE", "TURBULENCE", "gaussian_pair", "philox", "uniform"]
 
 CHANNEL = 1
 NOISE = 2
 GUST = 3
 TURBULENCE = 4
+DOOR = 5
 
 _MASK = 0xFFFFFFFF
 

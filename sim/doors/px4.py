@@ -1,0 +1,227 @@
+"""The door for PX4: the aircraft is the simulator to which PX4's software in the loop connects.
+
+Written from PX4's public sources (modules simulator and simulator_mavlink, start scripts rcS and px4-rc.*) and the
+MAVLink definitions. PX4 connects to our TCP port and is silent; its clock is set by HIL_SENSOR.time_usec alone. It
+answers a sample with HIL_ACTUATOR_CONTROLS once it is up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import socket
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftcc.link.codec import Codec, dialect
+from ftcc.link.mavlink import LOOPBACK, SIMULATOR
+from ftcc.link.ports import PortError
+from ftcc.sim.doors.channels import Channels, checked, fractions
+from ftcc.sim.doors.sensors import Fix, Readings, height_of
+from ftcc.sim.doors.vehicle import DoorVehicle
+
+__all__ = ["PERIOD_US", "PORT", "Px4Door"]
+
+PORT = 4560
+"""PX4 instance n connects to this port + n."""
+PERIOD_US = 4000
+"""Time between two HIL_SENSOR, us: the 250 Hz for which PX4's start scripts set IMU_INTEG_RATE."""
+_CHANNELS = 16
+_ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+_LOCKSTEP = 1
+"""Bit of HIL_ACTUATOR_CONTROLS.flags: PX4 is built for lockstep."""
+_ACCELERATION, _RATES, _FIELD, _DIFFERENTIAL, _PRESSURE = 0x7, 0x38, 0x1C0, 0x400, 0x1A00
+"""Groups of HIL_SENSOR.fields_updated; PX4 reads a group if all its bits are set."""
+_ALL = _ACCELERATION | _RATES | _FIELD | _DIFFERENTIAL | _PRESSURE
+_READ = 1 << 16
+_G = 9.80665
+_UNKNOWN_COURSE = 65535
+_STILL = 0.5
+"""Below this speed a receiver knows no course, m/s."""
+
+
+class Px4Door:
+    """One aircraft and the PX4 that flies it.
+
+    Parameters
+    ----------
+    vehicle : the aircraft.
+    port : TCP port on loopback at which PX4 is awaited.
+    table : the tasks of its channels.
+    report : called with what the user should know.
+
+    Raises
+    ------
+    PortError
+        If the port is in use.
+    ChannelError
+        If the table cannot be used.
+    """
+
+    autopilot = "PX4"
+
+    def __init__(self, vehicle: DoorVehicle, port: int, table: Channels, report: Callable[[str], None]) -> None:
+        self.vehicle, self.port = vehicle, port
+        self.controls: NDArray[np.float64] = np.zeros(4)
+        """Fractions of travel."""
+        self.armed = False
+        self.gone = ""
+        """Why the connection is lost; empty: it is not."""
+        self.bad = 0
+        """Pieces of what PX4 sent that were not valid MAVLink."""
+        self._table, self._report = checked(table, _CHANNELS), report
+        self._lockstep: bool | None = None
+        """Whether PX4 answers every sample; None before its first answer."""
+        self._sent = self._answered = -1
+        """Times of the last sample sent, and of the last one answered, us."""
+        self._codec = Codec(vehicle.uav, SIMULATOR)
+        self._parser = dialect.MAVLink(None)
+        self._parser.robust_parsing = True
+        vehicle.set_period(PERIOD_US, exactly=True)
+        self._connection: socket.socket | None = None
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._listener.bind((LOOPBACK, port))
+        except OSError as error:
+            self._listener.close()
+            raise PortError(f"port {port}: {error.strerror or error}") from None
+        self._listener.listen(1)
+        self._listener.setblocking(False)
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return (self._connection or self._listener).fileno()
+
+    @property
+    def connected(self) -> bool:
+        """Whether PX4 has connected."""
+        return self._connection is not None
+
+    @property
+    def running_free(self) -> bool:
+        """Whether samples go out by the clock: PX4 is not up yet, or not built for lockstep."""
+        return not self._lockstep
+
+    @property
+    def answered(self) -> bool:
+        """Whether the next step may be taken."""
+        return self.running_free or self._answered >= self._sent
+
+    def read(self) -> None:
+        """Take in what PX4 did: connect, send, close."""
+        if self._connection is None:
+            with contextlib.suppress(BlockingIOError):
+                self._connection, _ = self._listener.accept()
+                self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._connection.setblocking(False)
+                self._listener.close()
+            return
+        try:
+            data = self._connection.recv(_READ)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.gone = f"the connection broke: {error.strerror or error}"
+            return
+        if not data:
+            self.gone = "PX4 closed the connection"
+            return
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_msgId() < 0:
+                self.bad += 1
+            elif message.get_type() == "HIL_ACTUATOR_CONTROLS":
+                self._take(message)
+
+    def _take(self, message: Any) -> None:
+        """Put controls into force; those of an older sample than the last one are controls, but no answer."""
+        if self._lockstep is None:
+            self._lockstep = bool(message.flags & _LOCKSTEP)
+            if not self._lockstep:
+                self._report("this PX4 is not built for lockstep: it is sent samples by the clock")
+        self._answered = max(self._answered, int(message.time_usec))
+        self.armed = bool(message.mode & _ARMED)
+        fractions(self._table, message.controls, self.controls)
+
+    def send(self) -> None:
+        """Send the sample at hand."""
+        assert self._connection is not None
+        vehicle = self.vehicle
+        # 0 would be no time: the clock of an autopilot begins after it.
+        stamp = vehicle.now_us + PERIOD_US
+        readings = vehicle.read_sensors()
+        messages = [self._state(stamp)]
+        if readings.fix is not None:
+            messages.append(_position(stamp, readings.fix))
+        # Last, because it alone lets PX4's time pass.
+        messages.append(_sample(stamp, readings))
+        data = self._codec.pack(*messages)
+        try:
+            self._connection.setblocking(True)
+            self._connection.sendall(data)
+            self._connection.setblocking(False)
+        except OSError as error:
+            self.gone = f"the connection broke: {error.strerror or error}"
+        self._sent = stamp
+
+    def _state(self, stamp: int) -> Any:
+        """The truth, for PX4's log."""
+        motion, home = self.vehicle.motion, self.vehicle.home
+        latitude, longitude = home.place(motion.position[0], motion.position[1])
+        return dialect.MAVLink_hil_state_quaternion_message(
+            stamp,
+            list(motion.quaternion),
+            *motion.rates,
+            latitude,
+            longitude,
+            round(1e3 * (home.altitude + motion.position[2])),
+            *(_short(1e2 * v) for v in motion.velocity),
+            *(min(65535, round(1e2 * motion.airspeed)),) * 2,
+            *(_short(1e3 * f / _G) for f in motion.force),
+        )
+
+    def close(self) -> None:
+        """Free the port; PX4 sees its connection close."""
+        self._listener.close()
+        if self._connection is not None:
+            self._connection.close()
+
+
+def _short(value: float) -> int:
+    return max(-32768, min(32767, round(value)))
+
+
+def _position(stamp: int, fix: Fix) -> Any:
+    north, east, down = fix.velocity
+    ground = math.hypot(north, east)
+    course = round(math.degrees(math.atan2(east, north)) % 360.0 * 1e2) % 36000
+    return dialect.MAVLink_hil_gps_message(
+        stamp,
+        3,  # a fix in three dimensions
+        fix.latitude,
+        fix.longitude,
+        round(1e3 * fix.altitude),
+        90,  # eph and epv, cm
+        150,
+        min(65534, round(1e2 * math.hypot(ground, down))),
+        *(_short(1e2 * v) for v in fix.velocity),
+        course if ground > _STILL else _UNKNOWN_COURSE,
+        10,  # satellites
+    )
+
+
+def _sample(stamp: int, readings: Readings) -> Any:
+    return dialect.MAVLink_hil_sensor_message(
+        stamp,
+        *readings.force,
+        *readings.rates,
+        *readings.field,
+        1e-2 * readings.pressure,  # hPa
+        1e-2 * readings.differential,
+        height_of(readings.pressure),
+        readings.temperature,
+        _ALL,
+    )
