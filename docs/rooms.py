@@ -20,6 +20,7 @@ LABELS = {
     "swarm": "flight with processes",
     "simulation": "flight in one process",
     "dashboard": "live view",
+    "doors": "PX4, ArduPilot",
     "results": "a run's folder",
     "generator": "scenarios in a line",
     "jsbsim": "aircraft for JSBSim",

@@ -24,6 +24,7 @@ from ftcc.groundside.cli import (
     search,
     study,
     swarms,
+    vehicle,
     view,
 )
 from ftcc.groundside.cli.common import fail, warn
@@ -55,7 +56,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         airframe.airframe,
         identify.identify,
     ),
-    "Flights": (fly.fly, swarms.ps, swarms.stop, view.watch, swarms.doctor),
+    "Flights": (fly.fly, vehicle.vehicle, swarms.ps, swarms.stop, view.watch, swarms.doctor),
     "Results": (results.report, results.export, results.compare, movie.movie, view.replay),
     "Commands to a running swarm": (
         ground.vehicles,

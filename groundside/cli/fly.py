@@ -17,10 +17,12 @@ from ftcc.groundside.cli.common import (
     Settings,
     Strict,
     Variants,
+    fail,
     load_mission,
     scenario_names,
 )
 from ftcc.groundside.cli.flight_output import FlightOutput, JsonOutput, TerminalOutput
+from ftcc.groundside.cli.vehicle import check_door_options, fly_by_px4
 
 if TYPE_CHECKING:
     from ftcc.groundside.swarm import Outcome
@@ -73,12 +75,39 @@ def fly(
         bool, typer.Option("--json", help="Print progress, events and outcome as JSON, an object per line.")
     ] = False,
     strict: Strict = False,
+    px4: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH", help="Fly the followers by this PX4, the folder of a build or its px4, and not by our law."
+        ),
+    ] = None,
+    px4_model: Annotated[
+        str | None, typer.Option(help="Airframe of PX4; default: ftcc_plane, jsbsim_malolo or plane.")
+    ] = None,
 ) -> None:
     """Fly a swarm: a vehicle process and an autopilot process per UAV, with MAVLink, mesh and dashboard."""
+    from ftcc.groundside.doors import find_px4
     from ftcc.groundside.swarm import check_choices, prepare_flight, speed_factor
 
     factor = speed_factor(speed, "--speed")
     check_choices(clock, factor, viewer)
+    if px4_model is not None and px4 is None:
+        fail("--px4-model: belongs to --px4")
+    if px4 is not None:
+        check_door_options(
+            clock=clock != "lockstep",
+            hold=hold,
+            pack=pack != "1",
+            port=port is not None,
+            mavlink=mavlink is not None,
+            key=key is not None,
+            id_offset=id_offset != 0,
+            json=json,
+            strict=strict,
+        )
+        build = find_px4(px4, px4_model)
+        fly_by_px4(load_mission(scenario, form, variant, settings, seed, duration), build, out, factor)
+        return
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     options, ports = prepare_flight(
         mission,

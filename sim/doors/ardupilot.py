@@ -39,7 +39,7 @@ class Frame(NamedTuple):
 
     rate: int
     """Steps that it asks for, Hz."""
-    count: int
+    number: int
     """Grows by one with every answer; begins again when ArduPilot does."""
     pulses: tuple[int, ...]
     """us."""
@@ -50,8 +50,8 @@ def read_frame(data: bytes) -> Frame | None:
     layout = _MAGIC.get(int.from_bytes(data[:2], "little"))
     if layout is None or len(data) != layout.size:
         return None
-    _, rate, count, *pulses = layout.unpack(data)
-    return Frame(rate, count, tuple(pulses))
+    _, rate, number, *pulses = layout.unpack(data)
+    return Frame(rate, number, tuple(pulses))
 
 
 class ArduPilotDoor:
@@ -91,7 +91,7 @@ class ArduPilotDoor:
         self._frame: Frame | None = None
         """The newest one."""
         self._answer, self._answered = b"", -1
-        """The last answer, and the count of the frame that it answers."""
+        """The last answer, and the number of the frame that it answers."""
         self._began_us = 0
         """When this ArduPilot's time began, us."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -114,7 +114,7 @@ class ArduPilotDoor:
     @property
     def answered(self) -> bool:
         """Whether the next step may be taken: ArduPilot has sent the frame after the last answer."""
-        return self._frame is not None and self._frame.count > self._answered
+        return self._frame is not None and self._frame.number > self._answered
 
     def read(self) -> None:
         """Take in the frames at hand; only the newest counts, and one that has been answered is answered again."""
@@ -129,19 +129,25 @@ class ArduPilotDoor:
             frame = read_frame(data)
             if frame is None:
                 self.bad += 1
-            elif self._frame is None or frame.count < self._frame.count:
+            elif self._is_anew(frame, sender):
                 self._begin(frame, sender)
                 newest = frame
             elif sender == self._peer:
-                self.missed += max(0, frame.count - self._frame.count - 1)
+                self.missed += max(0, frame.number - self._frame.number - 1)
                 self._frame = newest = frame
             else:
                 self.bad += 1
         if newest is None:
             return
         by_pwm(self._table, newest.pulses, self.controls)
-        if newest.count == self._answered:
+        if newest.number == self._answered:
             self._transmit()
+
+    def _is_anew(self, frame: Frame, sender: tuple[str, int]) -> bool:
+        """Whether an ArduPilot begins with this frame."""
+        if self._frame is None or frame.number < self._frame.number:
+            return True
+        return frame.number == 0 and sender != self._peer
 
     def _begin(self, frame: Frame, sender: tuple[str, int]) -> None:
         """Begin with an ArduPilot: the first one, or one that was started again."""
@@ -171,7 +177,7 @@ class ArduPilotDoor:
         }
         # ArduPilot's reader finds a value right behind the colon, and the line between two line ends.
         self._answer = b"\n" + json.dumps(state, separators=(",", ":")).encode() + b"\n"
-        self._answered = self._frame.count
+        self._answered = self._frame.number
         self._transmit()
 
     def _transmit(self) -> None:

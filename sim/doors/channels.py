@@ -84,5 +84,3 @@ def by_pwm(table: Channels, pwm: Sequence[int], out: NDArray[np.float64]) -> Non
     pulse = pwm[table.throttle]
     signals[table.throttle] = (pulse - 1000) / 1000 if pulse else 0.0
     fractions(table, signals, out)
-
-

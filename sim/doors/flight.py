@@ -57,7 +57,7 @@ class DoorFlight:
     Parameters
     ----------
     doors : of vehicles with one period.
-    speed : simulated seconds per second; inf: as fast as the autopilots answer. Until they do, time passes at 1 at most.
+    speed : simulated seconds per second; inf: as fast as autopilots answer. Until they do, 1 at most.
     duration_us : of the scenario, us, from the end of the launch on.
     report : called with what the user should know.
     stopping : asked often; true ends the flight.

@@ -70,16 +70,15 @@ class Px4Door:
         self.armed = False
         self.gone = ""
         """Why the connection is lost; empty: it is not."""
-        self.bad = 0
-        """Pieces of what PX4 sent that were not valid MAVLink."""
         self._table, self._report = checked(table, _CHANNELS), report
         self._lockstep: bool | None = None
         """Whether PX4 answers every sample; None before its first answer."""
         self._sent = self._answered = -1
         """Times of the last sample sent, and of the last one answered, us."""
+        self._rest = b""
+        """What PX4 has not taken yet of the last sample."""
         self._codec = Codec(vehicle.uav, SIMULATOR)
-        self._parser = dialect.MAVLink(None)
-        self._parser.robust_parsing = True
+        self._stream = _Stream()
         vehicle.set_period(PERIOD_US, exactly=True)
         self._connection: socket.socket | None = None
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -97,6 +96,11 @@ class Px4Door:
         return (self._connection or self._listener).fileno()
 
     @property
+    def bad(self) -> int:
+        """Bytes that PX4 sent and that were not valid MAVLink."""
+        return self._stream.bad
+
+    @property
     def connected(self) -> bool:
         """Whether PX4 has connected."""
         return self._connection is not None
@@ -109,7 +113,8 @@ class Px4Door:
     @property
     def answered(self) -> bool:
         """Whether the next step may be taken."""
-        return self.running_free or self._answered >= self._sent
+        self._flush()
+        return not self._rest and (self.running_free or self._answered >= self._sent)
 
     def read(self) -> None:
         """Take in what PX4 did: connect, send, close."""
@@ -130,10 +135,8 @@ class Px4Door:
         if not data:
             self.gone = "PX4 closed the connection"
             return
-        for message in self._parser.parse_buffer(data) or ():
-            if message.get_msgId() < 0:
-                self.bad += 1
-            elif message.get_type() == "HIL_ACTUATOR_CONTROLS":
+        for message in self._stream.take(data):
+            if message.get_type() == "HIL_ACTUATOR_CONTROLS":
                 self._take(message)
 
     def _take(self, message: Any) -> None:
@@ -148,7 +151,6 @@ class Px4Door:
 
     def send(self) -> None:
         """Send the sample at hand."""
-        assert self._connection is not None
         vehicle = self.vehicle
         # 0 would be no time: the clock of an autopilot begins after it.
         stamp = vehicle.now_us + PERIOD_US
@@ -158,14 +160,20 @@ class Px4Door:
             messages.append(_position(stamp, readings.fix))
         # Last, because it alone lets PX4's time pass.
         messages.append(_sample(stamp, readings))
-        data = self._codec.pack(*messages)
+        self._rest = self._codec.pack(*messages)
+        self._sent = stamp
+        self._flush()
+
+    def _flush(self) -> None:
+        """Send what PX4 takes: one that stands still must not hold the others, nor the end of the flight."""
+        if self._connection is None or not self._rest or self.gone:
+            return
         try:
-            self._connection.setblocking(True)
-            self._connection.sendall(data)
-            self._connection.setblocking(False)
+            self._rest = self._rest[self._connection.send(self._rest) :]
+        except BlockingIOError:
+            return
         except OSError as error:
             self.gone = f"the connection broke: {error.strerror or error}"
-        self._sent = stamp
 
     def _state(self, stamp: int) -> Any:
         """The truth, for PX4's log."""
@@ -188,6 +196,62 @@ class Px4Door:
         self._listener.close()
         if self._connection is not None:
             self._connection.close()
+
+
+class _Stream:
+    """Messages in a stream of bytes. What only looks like the head of one takes no real message with it: in lockstep
+    a lost answer would never be sent again."""
+
+    def __init__(self) -> None:
+        self.bad = 0
+        """Bytes that belonged to no message."""
+        self._mav = dialect.MAVLink(None)
+        self._bytes = bytearray()
+
+    def take(self, data: bytes) -> list[Any]:
+        """Return the messages that ``data`` completes."""
+        self._bytes += data
+        messages: list[Any] = []
+        at = end = 0
+        """Where to look, and where the last message ended."""
+        first: int | None = None
+        """Where one begins that is not complete."""
+        while at < len(self._bytes):
+            size = self._size(at)
+            if size > 0 and at + size <= len(self._bytes):
+                message = self._read(at, size)
+                if message is not None:
+                    messages.append(message)
+                    self.bad += at - end
+                    at = end = at + size
+                    first = None
+                    continue
+            elif size > 0 and first is None:
+                first = at
+            at += 1
+        kept = at if first is None else first
+        self.bad += kept - end
+        del self._bytes[:kept]
+        return messages
+
+    def _read(self, at: int, size: int) -> Any:
+        """The message there; None if the checksum is wrong, or its kind unknown, so that there is none to tell."""
+        try:
+            message = self._mav.decode(self._bytes[at : at + size])
+        except dialect.MAVError:
+            return None
+        return message if message.get_msgId() in dialect.mavlink_map else None
+
+    def _size(self, at: int) -> int:
+        """Bytes of the message that may begin there; 0: none does."""
+        head = self._bytes[at : at + 3]
+        if head[0] == dialect.PROTOCOL_MARKER_V1:
+            return 8 + (head[1] if len(head) > 1 else 0)
+        if head[0] != dialect.PROTOCOL_MARKER_V2:
+            return 0
+        if len(head) < 3:
+            return 12
+        return 12 + head[1] + (13 if head[2] & dialect.MAVLINK_IFLAG_SIGNED else 0)
 
 
 def _short(value: float) -> int:

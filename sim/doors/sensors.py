@@ -25,6 +25,8 @@ _BIASES = 1000
 """Where the pairs of the biases are counted from."""
 _SEA_LEVEL, _LAPSE, _WARMTH, _EXPONENT = 101_325.0, 0.0065, 288.15, 5.25588
 """International standard atmosphere up to 11 km: Pa, K/m, K, g/(R lapse)."""
+_THIN = 0.3
+"""Least temperature ratio: far above what the atmosphere of 11 km describes, the pressure stays positive."""
 
 
 class Sizes(NamedTuple):
@@ -128,7 +130,7 @@ def _draw(seed, sample, uav, first, out):
 
 def pressure_at(height: float) -> float:
     """Pressure (Pa) of the standard atmosphere at a height above mean sea level (m)."""
-    return float(_SEA_LEVEL * (1.0 - _LAPSE * height / _WARMTH) ** _EXPONENT)
+    return float(_SEA_LEVEL * max(1.0 - _LAPSE * height / _WARMTH, _THIN) ** _EXPONENT)
 
 
 def height_of(pressure: float) -> float:
@@ -172,12 +174,8 @@ class Sensors:
         field = [sum(a * b for a, b in zip(axis, sizes.field, strict=True)) for axis in axes]
         dynamic = 0.5 * motion.density * motion.airspeed * motion.airspeed
         return Readings(
-            force=_three(
-                seen(n, motion.force[n], sizes.accelerometer, sizes.accelerometer_bias) for n in range(3)
-            ),
-            rates=_three(
-                seen(3 + n, motion.rates[n], sizes.gyroscope, sizes.gyroscope_bias) for n in range(3)
-            ),
+            force=_three(seen(n, motion.force[n], sizes.accelerometer, sizes.accelerometer_bias) for n in range(3)),
+            rates=_three(seen(3 + n, motion.rates[n], sizes.gyroscope, sizes.gyroscope_bias) for n in range(3)),
             field=_three(seen(6 + n, field[n], sizes.magnetometer, sizes.magnetometer_bias) for n in range(3)),
             pressure=seen(9, pressure_at(height), sizes.barometer, sizes.barometer_bias),
             differential=seen(10, dynamic, sizes.pitot, sizes.pitot_bias),
@@ -198,4 +196,3 @@ class Sensors:
 def _three(values: Iterable[float]) -> tuple[float, float, float]:
     first, second, third = values
     return first, second, third
-

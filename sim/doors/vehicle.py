@@ -20,7 +20,7 @@ from ftcc.sim.build import build_fleet
 from ftcc.sim.doors.sensors import Motion, Readings, Sensors, Sizes
 from ftcc.sim.obstacles import clearance
 from ftcc.sim.plant import ALPHA, BETA, CHI, GAMMA, LOST, MU, TRUTH, P, Q, R, V, X, Y, Z
-from ftcc.sim.plants import cycle_of, find
+from ftcc.sim.plants import conditions_of, cycle_of, find
 from ftcc.sim.process import columns, places
 from ftcc.sim.spec import VehicleSpec
 from ftcc.sim.wind import NO_TURBULENCE, wind_speed
@@ -77,6 +77,7 @@ class DoorVehicle:
         self._wanted_step, self._record_us = timing.step_us, timing.record_every * timing.period_us
         self._record_every = 1
         self._plant, self._cycle = find(spec.plant), cycle_of(spec.plant)
+        _load_compiled(self.spec, timing.step_us)
         self.fleet = build_fleet([self.spec])
         self._sensors = Sensors(spec.uav, timing.seed, home, sizes)
         self._parameters = self._plant.Parameters(*spec.airframe)
@@ -242,6 +243,14 @@ class DoorVehicle:
             self._recorder.close()
 
 
+def _load_compiled(spec: VehicleSpec, step_us: int) -> None:
+    """Load, or compile, what a step needs before an autopilot waits for it."""
+    fleet, cycle = build_fleet([spec]), cycle_of(spec.plant)
+    latch(fleet, 0, fleet.command[0].copy())
+    cycle.advance(fleet, 0, 0, step_us, step_us)
+    cycle.conditions(fleet, 0, 0.0, np.zeros(len(conditions_of(spec.plant))))
+
+
 Quaternion = tuple[float, float, float, float]
 
 
@@ -256,9 +265,7 @@ def _between(a: tuple[float, ...], b: tuple[float, ...]) -> Quaternion:
 
 def _turned(vector: list[float], quaternion: Quaternion) -> tuple[float, float, float]:
     """A vector north, east, down in body axes."""
-    first, second, third = (
-        sum(a * b for a, b in zip(axis, vector, strict=True)) for axis in body_axes(*quaternion)
-    )
+    first, second, third = (sum(a * b for a, b in zip(axis, vector, strict=True)) for axis in body_axes(*quaternion))
     return first, second, third
 
 
