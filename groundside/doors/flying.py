@@ -6,16 +6,20 @@ import contextlib
 import signal
 import threading
 import time
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import tomli_w
+
+from ftcc.airside.process import columns as autopilot_columns
 from ftcc.groundside.doors.preparing import DoorError
 from ftcc.groundside.doors.programs import Programs, Px4Build, instance_of
 from ftcc.link.home import Home
 from ftcc.link.ports import PortError
-from ftcc.link.recording import AIRCRAFT_LOST, EventLog
+from ftcc.link.recording import AIRCRAFT_LOST, EventLog, PartWriter, part_path
 from ftcc.sim.doors import ardupilot, channels, px4
 from ftcc.sim.doors.flight import Door, DoorFlight
 from ftcc.sim.doors.sensors import Sizes
@@ -71,7 +75,7 @@ def fly_behind_doors(
     DoorError
         If a port is in use, or PX4 cannot be started.
     """
-    (folder / "scenario.toml").write_text(mission.toml_of_run(time.time()), encoding="utf-8")
+    _begin_run(mission, folder, uavs)
     if ports is None:
         ports = {uav: px4.PORT + instance_of(uav) for uav in uavs}
     log = EventLog(folder / "events.jsonl")
@@ -112,6 +116,18 @@ def fly_behind_doors(
     finally:
         log.close()
     return outcome
+
+
+def _begin_run(mission: Mission, folder: Path, uavs: Sequence[int]) -> None:
+    """Write the scenario, without its claims: they are about our law, which does not fly.
+
+    Parts without rows make the columns of its signals, so that reports find them, empty.
+    """
+    document = {key: value for key, value in tomllib.loads(mission.toml).items() if key != "claims"}
+    flown = replace(mission, toml=tomli_w.dumps(document))
+    (folder / "scenario.toml").write_text(flown.toml_of_run(time.time()), encoding="utf-8")
+    for uav in uavs:
+        PartWriter(part_path(folder, uav, "autopilot"), autopilot_columns(mission.signals)).close()
 
 
 def _door(

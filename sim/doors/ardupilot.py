@@ -129,7 +129,7 @@ class ArduPilotDoor:
             frame = read_frame(data)
             if frame is None:
                 self.bad += 1
-            elif self._is_anew(frame, sender):
+            elif self._frame is None or self._is_anew(frame, self._frame, sender):
                 self._begin(frame, sender)
                 newest = frame
             elif sender == self._peer:
@@ -143,11 +143,9 @@ class ArduPilotDoor:
         if newest.number == self._answered:
             self._transmit()
 
-    def _is_anew(self, frame: Frame, sender: tuple[str, int]) -> bool:
-        """Whether an ArduPilot begins with this frame."""
-        if self._frame is None or frame.number < self._frame.number:
-            return True
-        return frame.number == 0 and sender != self._peer
+    def _is_anew(self, frame: Frame, before: Frame, sender: tuple[str, int]) -> bool:
+        """Whether ArduPilot was started again."""
+        return frame.number < before.number or (frame.number == 0 and sender != self._peer)
 
     def _begin(self, frame: Frame, sender: tuple[str, int]) -> None:
         """Begin with an ArduPilot: the first one, or one that was started again."""
