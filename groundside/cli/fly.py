@@ -86,7 +86,6 @@ def fly(
     ] = None,
 ) -> None:
     """Fly a swarm: a vehicle process and an autopilot process per UAV, with MAVLink, mesh and dashboard."""
-    from ftcc.groundside.doors import find_px4
     from ftcc.groundside.swarm import check_choices, prepare_flight, speed_factor
 
     factor = speed_factor(speed, "--speed")
@@ -94,6 +93,8 @@ def fly(
     if px4_model is not None and px4 is None:
         fail("--px4-model: belongs to --px4")
     if px4 is not None:
+        from ftcc.groundside.doors import find_px4
+
         check_door_options(
             clock=clock != "lockstep",
             hold=hold,

@@ -17,6 +17,8 @@ __all__ = ["Programs", "Px4Build", "find_px4", "instance_of"]
 
 _MODELS = ("ftcc_plane", "jsbsim_malolo", "plane")
 """Airframes of PX4 that fit, the best first."""
+_OTHER_SIMULATORS = ("PX4_SIMULATOR", "PX4_SIM_HOSTNAME", "PX4_SIM_HOST_ADDR", "PX4_SYS_AUTOSTART")
+"""What a user's shell may hold for another simulator, and must not choose ours: its kind, host and airframe."""
 _LAST_INSTANCE = 254
 """MAV_SYS_ID is the instance + 1, up to 255."""
 _END = 3.0
@@ -104,7 +106,8 @@ class Programs:
             own.mkdir(parents=True)
             # -d: no shell; the last argument is where the start scripts are.
             command = [str(self.build.program), "-i", str(instance_of(uav)), "-d", str(self.build.etc)]
-            environment = os.environ | {"PX4_SIM_MODEL": self.build.model, "MAV_SYS_ID": str(uav)}
+            environment = {name: value for name, value in os.environ.items() if name not in _OTHER_SIMULATORS}
+            environment["PX4_SIM_MODEL"] = self.build.model
             try:
                 with (own / "px4.log").open("wb") as log:
                     self._running[uav] = subprocess.Popen(

@@ -29,6 +29,9 @@ PORT = 4560
 """PX4 instance n connects to this port + n."""
 PERIOD_US = 4000
 """Time between two HIL_SENSOR, us: the 250 Hz for which PX4's start scripts set IMU_INTEG_RATE."""
+_FIRST_US = 1
+"""First time_usec, us. For PX4 0 is no time. Its own clock, which stamps its answers, begins at 0 (drv_hrt.cpp): an
+answer has the stamp of its sample, or less by this; releases differ in that."""
 _CHANNELS = 16
 _ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _LOCKSTEP = 1
@@ -74,7 +77,7 @@ class Px4Door:
         self._lockstep: bool | None = None
         """Whether PX4 answers every sample; None before its first answer."""
         self._sent = self._answered = -1
-        """Times of the last sample sent, and of the last one answered, us."""
+        """Times of the last sample sent, and stamp of the newest answer, us."""
         self._rest = b""
         """What PX4 has not taken yet of the last sample."""
         self._codec = Codec(vehicle.uav, SIMULATOR)
@@ -114,7 +117,8 @@ class Px4Door:
     def answered(self) -> bool:
         """Whether the next step may be taken."""
         self._flush()
-        return not self._rest and (self.running_free or self._answered >= self._sent)
+        # An answer to the sample before is a whole period older, see _FIRST_US.
+        return not self._rest and (self.running_free or self._answered > self._sent - PERIOD_US)
 
     def read(self) -> None:
         """Take in what PX4 did: connect, send, close."""
@@ -152,8 +156,7 @@ class Px4Door:
     def send(self) -> None:
         """Send the sample at hand."""
         vehicle = self.vehicle
-        # 0 would be no time: the clock of an autopilot begins after it.
-        stamp = vehicle.now_us + PERIOD_US
+        stamp = vehicle.now_us + _FIRST_US
         readings = vehicle.read_sensors()
         messages = [self._state(stamp)]
         if readings.fix is not None:

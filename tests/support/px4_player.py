@@ -30,16 +30,20 @@ class Player:
     arm_at : simulated time at which it arms and gives thrust, s.
     die_at : simulated time at which it closes its connection, s.
     junk : whether it sends bytes between its messages that are no MAVLink.
+    own_clock : whether answers are stamped since the first sample (main), or with the sample's time (2021): in lockstep
+        platforms/posix/src/px4/common/drv_hrt.cpp counts from the first time that is set, and 2021 adds it again.
     """
 
     def __init__(
-        self, port: int, arm_at: float = 1.0, die_at: float = math.inf, junk: bool = False, lockstep: bool = True
+        self, port: int, arm_at: float = 1.0, die_at: float = math.inf, junk: bool = False, own_clock: bool = False
     ) -> None:
-        self.port, self.arm_at, self.die_at, self.junk, self.lockstep = port, arm_at, die_at, junk, lockstep
+        self.port, self.arm_at, self.die_at, self.junk, self.own_clock = port, arm_at, die_at, junk, own_clock
         self.mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self.mav.robust_parsing = True
         self.clock = 0
         """us, set by HIL_SENSOR alone."""
+        self.began = 0
+        """Its first value."""
         self.truth: Any = None
         self.height: float | None = None
         self.samples = self.fixes = 0
@@ -85,6 +89,7 @@ class Player:
             assert message.time_usec > self.clock, "the clock must not stand or go back"
             assert message.fields_updated & 0x1FFF == 0x1FFF
             self.clock = message.time_usec
+            self.began = self.began or self.clock
             self.samples += 1
             if self.clock / 1e6 >= UP_AT:
                 self.answer()
@@ -96,7 +101,7 @@ class Player:
         if armed:
             self.hold(controls)
         message = mavlink.MAVLink_hil_actuator_controls_message(
-            self.clock, controls, 1 | (128 if armed else 0), int(self.lockstep)
+            self.clock - (self.began if self.own_clock else 0), controls, 1 | (128 if armed else 0), 1
         )
         if self.junk:
             self.connection.sendall(b"\xfd\x00junk\xfe")
@@ -129,8 +134,9 @@ def main() -> None:
     parser.add_argument("--arm-at", type=float, default=1.0)
     parser.add_argument("--die-at", type=float, default=math.inf)
     parser.add_argument("--junk", action="store_true")
+    parser.add_argument("--own-clock", action="store_true")
     options = parser.parse_args()
-    Player(options.port, options.arm_at, options.die_at, options.junk).run()
+    Player(options.port, options.arm_at, options.die_at, options.junk, options.own_clock).run()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ import pytest
 
 from ftcc.groundside import Run
 from ftcc.groundside.cli import main
-from ftcc.groundside.doors import DoorError, find_px4
+from ftcc.groundside.doors import DoorError, find_px4, set_aside
+from ftcc.groundside.scenario import load, resolve
 from ftcc.sim.doors import px4
 from tests.support.ports import free_port
 
@@ -57,7 +58,7 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_program(
         folder,
         f"""
-        echo "arguments $@"; echo "model $PX4_SIM_MODEL, system $MAV_SYS_ID, folder $(basename "$PWD")"
+        echo "arguments $@"; echo "model $PX4_SIM_MODEL$PX4_SIMULATOR, folder $(basename "$PWD")"
         cd {ROOT}; exec {sys.executable} -m tests.support.px4_player --port $(({first} + $2))
         """,
     )
@@ -70,20 +71,23 @@ def write_program(folder: Path, script: str) -> None:
     program.chmod(0o755)
 
 
-def test_a_swarm_by_px4_starts_one_for_each_aircraft_and_leaves_a_run(ftcc, build, tmp_path):
+def test_a_swarm_by_px4_starts_one_for_each_aircraft_and_leaves_a_run(ftcc, build, tmp_path, monkeypatch):
+    monkeypatch.setenv("PX4_SIMULATOR", "gz")
     code, out, err = ftcc("fly", *SCENARIO, "--px4", build, "--speed", "max", "--duration", 2, "--out", "run")
     assert (code, err) == (0, "")
     assert "flown: 2 s of the scenario" in out
     logs = [(tmp_path / "run" / "px4" / str(uav) / "px4.log").read_text().splitlines() for uav in (1, 2, 3, 4)]
     assert [log[0] for log in logs] == [f"arguments -i {n} -d {build}/etc" for n in range(4)]
-    assert [log[1] for log in logs] == [f"model jsbsim_malolo, system {uav}, folder {uav}" for uav in (1, 2, 3, 4)]
+    assert [log[1] for log in logs] == [f"model jsbsim_malolo, folder {uav}" for uav in (1, 2, 3, 4)]
     run = Run(tmp_path / "run")
     assert run.uavs == (1, 2, 3, 4)
     assert run.end == pytest.approx(2.0)
     assert len({run.column("t", uav).tobytes() for uav in run.uavs}) == 1
     assert np.abs(run.column("z", 3) - 1000.0).max() < 5.0
-    assert ftcc("report", "run")[0] == 0
-    assert (tmp_path / "run" / "report" / "index.html").exists()
+    assert np.isnan(run.column("wall", 3)).all()  # a signal of the law, which did not fly
+    code, out, _ = ftcc("report", "run", "--no-page")
+    assert code == 0
+    assert "the scenario makes no claims" in out
     assert not children()
 
 
@@ -178,6 +182,16 @@ def test_bad_input_is_one_line_and_starts_nothing(ftcc, tmp_path, arguments, sai
     assert said in err
     assert len(err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_does_not_act_behind_a_door_is_named():
+    assert set_aside(resolve(load("attitude_synchronization"))) == ()
+    noisy = resolve(load("attitude_synchronization", settings=["noise.p=0.01"]))
+    assert set_aside(noisy) == ("the measurement noise (doors have sensors)",)
+    blind = resolve(
+        load("attitude_synchronization", settings=['faults=[{at=1.0,uav=1,navigation="position",kind="off"}]'])
+    )
+    assert set_aside(blind) == ("faults of navigation",)
 
 
 def test_a_port_in_use_is_refused(ftcc, tmp_path):

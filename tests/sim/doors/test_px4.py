@@ -12,7 +12,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from ftcc.link.ports import PortError
+from ftcc.sim.doors import flight
 from ftcc.sim.doors.channels import PX4, ChannelError, Channels, by_pwm, checked, fractions
+from ftcc.sim.doors.flight import DoorFlight
 from ftcc.sim.doors.px4 import Px4Door
 from tests.sim.doors.bench import Flown, a_vehicle, by_px4, fly, player, pytest_fails
 from tests.support.ports import free_port
@@ -44,6 +46,12 @@ def test_a_flight_repeats_bit_for_bit(flown):
 def test_junk_between_messages_changes_nothing(flown):
     noisy = by_px4(2.0, arguments=["--junk"])
     assert noisy.truth[1].tobytes() == flown.truth[1][:501].tobytes()
+
+
+def test_answers_stamped_by_the_clock_of_px4_are_the_same(flown):
+    """Main stamps them since its first sample, 2021 with the time of the sample."""
+    other = by_px4(2.0, arguments=["--own-clock"])
+    assert other.truth[1].tobytes() == flown.truth[1][:501].tobytes()
 
 
 def test_a_fault_of_the_scenario_acts_on_the_controls_received(flown):
@@ -150,7 +158,7 @@ def test_the_bytes_of_a_sample_are_those_of_the_public_definition():
     assert int.from_bytes(frame[-2:], "little") == checksum(frame[1:-2] + bytes([108]))
     payload = frame[10:-2].ljust(64, b"\0")  # MAVLink 2 leaves zeros at the end out
     stamp, *numbers, fields = struct.unpack("<Q13fI", payload[:64])
-    assert (stamp, fields) == (4000, 0x1FFF)
+    assert (stamp, fields) == (1, 0x1FFF)
     field = (0.2175, 0.0133, 0.4333)
     # Specific force, rates, field; hPa at 500 m (ISO 2533: 95461 Pa), no dynamic pressure, height, deg C.
     expected = (0.0, 0.0, -9.8, 0.0, 0.0, 0.0, *field, 954.61, 0.0, 500.0, 11.75)
@@ -197,23 +205,38 @@ def test_the_fix_has_the_units_of_hil_gps():
     assert (truth.true_airspeed, truth.vx, truth.alt) == (3000, moving.vn, 1_400_000)
 
 
-def test_samples_go_out_by_the_clock_until_the_first_answer_and_then_one_for_each():
+@pytest.mark.parametrize("first", [0, 1])
+def test_samples_go_out_by_the_clock_until_the_first_answer_and_then_one_for_each(first: int):
     door = Px4Door(a_vehicle(), free_port(), PX4, pytest_fails)
     with closing(door), closing(connected(door)) as client:
-        for _ in range(3):
+        for n in range(3):
+            if n:
+                door.vehicle.advance(door.controls)
             door.send()
             assert door.answered
-            door.vehicle.advance(door.controls)
-        take(door, controls(8000, [0.0] * 16), client)
+        take(door, controls(4000 + first, [0.0] * 16), client)
         assert not door.answered  # that was for the second sample; the third is on its way
-        take(door, controls(12000, [0.0] * 16), client)
+        take(door, controls(8000 + first, [0.0] * 16), client)
         assert door.answered
+        door.vehicle.advance(door.controls)
         door.send()
         assert not door.answered
-        take(door, controls(12000, [0.0] * 16), client)
+        take(door, controls(8000 + first, [0.0] * 16), client)
         assert not door.answered
-        take(door, controls(16000, [0.0] * 16), client)
+        take(door, controls(12000 + first, [0.0] * 16), client)
         assert door.answered
+
+
+def test_one_that_does_not_answer_is_reported_and_not_ended(monkeypatch):
+    monkeypatch.setattr(flight, "_PATIENCE", 0.1)
+    door = Px4Door(a_vehicle(), free_port(), PX4, pytest_fails)
+    said: list[str] = []
+    with closing(socket.create_connection(("127.0.0.1", door.port))) as client, closing(door):
+        client.sendall(controls(1, [0.0] * 16))
+        report = DoorFlight([door], math.inf, 1, lambda text, _: said.append(text), lambda: len(said) > 1)
+        report.fly()
+    assert said[1] == "still waits for PX4 to answer"
+    assert report.lost == {}
 
 
 def test_a_px4_without_lockstep_is_told_and_flown_by_the_clock():
