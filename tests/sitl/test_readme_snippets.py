@@ -58,7 +58,7 @@ NOT_RUN = {
     "pytest": "is these tests",
     "python docs/build.py": "builds the site: tests/test_site.py",
     "ftcc doctor": "flies for a quarter of a minute: tests/groundside/swarm/test_doctor.py",
-    "ftcc vehicle": "waits for an autopilot: tests/groundside/doors/test_doors.py",
+    "ftcc vehicle ": "waits for an autopilot: tests/groundside/doors/test_doors.py",
     "ftcc fly attitude_synchronization --variant healthy --px4": "needs a PX4: tests/groundside/doors/test_doors.py",
     "PX4_SIM_MODEL": "needs a PX4",
     "arduplane": "needs an ArduPilot",
