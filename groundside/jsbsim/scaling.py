@@ -1,8 +1,8 @@
 """Gains for an aircraft of other size and speed: those for the reference airframe, scaled by their units.
 
 The rule: time in units of the aircraft's own pitching, 1 / sqrt(-Cma qbar S c / Iy), speed in units of its airspeed,
-and length in units of both. A gain in 1/s therefore shrinks as the aircraft gets slower in pitch, one in m/s grows with
-its speed, and one without a unit stays.
+length in units of both, and mass in units of its mass. A gain in 1/s therefore shrinks as the aircraft gets slower in
+pitch, one in m/s grows with its speed, and one without a unit stays.
 """
 
 from __future__ import annotations
@@ -18,6 +18,10 @@ __all__ = ["Scale", "scale_of", "scaled_gains"]
 
 _DESIGN_SPEED = 30.0
 """For which the gains of all schemes were designed, on the reference airframe, m/s."""
+_DESIGN_MASS = 25.0
+"""Of the reference airframe, kg."""
+_POWERS = {"m": (1.0, 0.0, 0.0), "s": (0.0, 1.0, 0.0), "rad": (0.0, 0.0, 0.0), "N": (1.0, -2.0, 1.0)}
+"""Powers of length, time and mass in each unit."""
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(\d+)|\^\((\d+)/(\d+)\))?$")
 """A unit with a power, such as s^2 or s^(1/2)."""
 
@@ -29,6 +33,8 @@ class Scale(NamedTuple):
     """Its pitching takes this many times as long."""
     speed: float
     """It flies this many times as fast."""
+    mass: float
+    """It is this many times as heavy."""
 
     def factor(self, unit: str) -> float | None:
         """Return the factor of a quantity in this unit; None for a unit that the rule does not know."""
@@ -39,25 +45,27 @@ class Scale(NamedTuple):
                 power = _power(word)
                 if power is None:
                     return None
-                length, time = power
-                factor *= ((self.speed * self.time) ** length * self.time**time) ** (1 if n == 0 else -1)
+                length, time, mass = power
+                one = (self.speed * self.time) ** length * self.time**time * self.mass**mass
+                factor *= one if n == 0 else 1.0 / one
         return factor
 
 
-def _power(word: str) -> tuple[float, float] | None:
-    """Return the powers of length and time in a unit; None if it is neither, nor without a dimension."""
+def _power(word: str) -> tuple[float, float, float] | None:
+    """Return the powers of length, time and mass in a unit with its exponent; None if the rule does not know it."""
     if word in ("1", "-"):
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     found = _FACTOR.match(word)
-    if found is None or found[1] not in ("m", "s", "rad"):
+    if found is None or found[1] not in _POWERS:
         return None
-    power = float(found[2]) if found[2] else float(found[3]) / float(found[4]) if found[3] else 1.0
-    return {"m": (power, 0.0), "s": (0.0, power), "rad": (0.0, 0.0)}[found[1]]
+    exponent = float(found[2]) if found[2] else float(found[3]) / float(found[4]) if found[3] else 1.0
+    length, time, mass = _POWERS[found[1]]
+    return exponent * length, exponent * time, exponent * mass
 
 
 def scale_of(airframe: Airframe, V: float) -> Scale:
     """Return the scale of an aircraft that flies at ``V`` (m/s)."""
-    return Scale(1.0 / float(pace_of(V, airframe)), V / _DESIGN_SPEED)
+    return Scale(1.0 / float(pace_of(V, airframe)), V / _DESIGN_SPEED, airframe.m / _DESIGN_MASS)
 
 
 def scaled_gains(scheme: Scheme, form: str, scale: Scale) -> tuple[dict[str, float], list[str]]:

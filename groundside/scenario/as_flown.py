@@ -19,8 +19,9 @@ _VERSIONED = ("ftcc-sitl", "numpy", "numba", "scipy", "pydantic", "pymavlink", "
 
 
 @functools.cache
-def _versions() -> dict[str, str]:
-    return {name: importlib.metadata.version(name) for name in _VERSIONED} | {"python": platform.python_version()}
+def _versions(jsbsim: bool) -> dict[str, str]:
+    names = [*_VERSIONED, *(["jsbsim"] if jsbsim else [])]
+    return {name: importlib.metadata.version(name) for name in names} | {"python": platform.python_version()}
 
 
 def _all_gains(scenario: Scenario, scheme: Scheme) -> dict[str, float]:
@@ -48,6 +49,6 @@ def as_flown(scenario: Scenario, scheme: Scheme) -> str:
         "form": scenario.form,
         "variants": list(scenario.variants),
         "settings": list(scenario.settings),
-        "versions": _versions(),
+        "versions": _versions(scenario.plan.plant.aircraft is not None),
     }
     return tomli_w.dumps(document)

@@ -58,12 +58,13 @@ def test_the_shipped_sheets_are_what_the_command_writes(name: str, V: float, alt
 def test_gains_scale_by_their_units() -> None:
     scale = scale_of(record_of(SHEET, Airframe), 30.0)
     assert scale.time == pytest.approx(1.0, abs=2e-3)
-    assert scale.speed == 1.0
-    slow = scale._replace(time=4.0, speed=3.0)
+    assert (scale.speed, scale.mass) == (1.0, 1.0)
+    slow = scale._replace(time=4.0, speed=3.0, mass=10.0)
     wanted = {"1/s": 0.25, "rad/s^2": 1 / 16, "m": 12.0, "m/s": 3.0, "m/s^2": 0.75, "s": 4.0, "m s": 48.0}
     wanted |= {"s^(1/2)": 2.0, "rad^(1/2)/s^(3/2)": 1 / 8, "s/rad": 4.0, "-": 1.0, "rad": 1.0}
-    assert [slow.factor(unit) for unit in ("N", "m^(1-r)/s")] == [None, None]
-    assert {unit: slow.factor(unit) for unit in wanted} == wanted
+    wanted |= {"N": 7.5, "N/m": 7.5 / 12.0, "N s^2/m": 10.0}
+    assert slow.factor("m^(1-r)/s") is None
+    assert {unit: slow.factor(unit) for unit in wanted} == pytest.approx(wanted)
     changed, unknown = scaled_gains(find("containment"), "flight", slow)
     assert changed["k11"] == pytest.approx(0.75)
     assert "l1" not in changed
