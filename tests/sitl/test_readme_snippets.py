@@ -72,6 +72,8 @@ NOT_RUN = {
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "ftcc fly jsbsim_attitude": "compiles a minute for what tests/sitl/test_schemes.py shows on another law",
+    "ftcc simulate jsbsim_fire": "likewise; tests/groundside/scenario/test_jsbsim.py checks the scenario",
     "jsbsim --root=. --script=": "is JSBSim's: tests/groundside/jsbsim/test_referee.py",
     "docker": "needs a container engine",
     "ssh": "needs another computer",
@@ -322,7 +324,7 @@ def test_an_excerpt_of_the_law_stands_in_the_law(block: Block) -> None:
 
 @pytest.mark.parametrize("block", FRAGMENTS, ids=str)
 def test_a_piece_of_toml_is_taken(block: Block, tmp_path: Path) -> None:
-    """A piece of a scenario replaces its like in the shipped one of chapter 5; one of a package names its schemes."""
+    """A piece of a scenario replaces its like in a shipped one of chapter 5; one of a package names its schemes."""
     said = tomllib.loads(block.text)
     if "project" in said:
         offered = said["project"]["entry-points"]
@@ -332,8 +334,9 @@ def test_a_piece_of_toml_is_taken(block: Block, tmp_path: Path) -> None:
             assert offered == tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]["entry-points"]
         return
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text(tomli_w.dumps(read(shipped()["containment"]) | said))
-    assert resolve(load(scenario)).warnings == resolve(load("containment")).warnings
+    like = "jsbsim_containment" if said.get("plant", {}).get("model") == "jsbsim" else "containment"
+    scenario.write_text(tomli_w.dumps(read(shipped()[like]) | said))
+    assert resolve(load(scenario)).warnings == resolve(load(like)).warnings
 
 
 def inline() -> list[tuple[str, str]]:
