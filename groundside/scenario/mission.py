@@ -115,6 +115,7 @@ class Mission:
                 spec,
                 gust=spec.gust if spec.gust == CALM else spec.gust._replace(seed=seed),
                 turbulence=spec.turbulence if spec.turbulence == NO_TURBULENCE else spec.turbulence._replace(seed=seed),
+                flown=None if spec.flown is None else replace(spec.flown, seed=seed),
             )
             for spec in self.vehicles
         )

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 __all__ = [
     "POUND",
     "THROTTLE",
+    "TURBULENCE",
     "Accelerations",
     "Bench",
     "Commands",
@@ -23,6 +24,7 @@ __all__ = [
     "throttles_of",
 ]
 
+TURBULENCE = "atmosphere/turb-type"
 THROTTLE = "fcs/throttle-cmd-norm"
 _SURFACES = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm")
 POUND = 4.4482216152605
@@ -92,14 +94,20 @@ def set_commands(model: jsbsim.FGFDMExec, commands: Commands) -> None:
         model[throttle] = commands.throttle
 
 
-def prepare(model: jsbsim.FGFDMExec) -> None:
-    """Make an aircraft clean: engines rich and at full pitch, wheels up."""
+def prepare(model: jsbsim.FGFDMExec, aircraft: Aircraft) -> None:
+    """Make an aircraft clean, engines rich and at full pitch, wheels up; then set its properties, in still air.
+
+    JSBSim's own turbulence, if it is among the properties, is nan while an aircraft is held.
+    """
     for n in range(engines_of(model)):
         model[f"fcs/mixture-cmd-norm[{n}]"] = 1.0
         model[f"fcs/advance-cmd-norm[{n}]"] = 1.0
     for name in ("gear/gear-cmd-norm", "gear/gear-pos-norm"):
         if model.get_property_manager().hasNode(name):
             model[name] = 0.0
+    for name, value in aircraft.properties:
+        model[name] = value
+    model[TURBULENCE] = 0.0
 
 
 def start_engines(model: jsbsim.FGFDMExec) -> None:
@@ -123,9 +131,7 @@ class Bench:
     def __init__(self, aircraft: Aircraft) -> None:
         self.aircraft = aircraft
         self.model = load(aircraft)
-        prepare(self.model)
-        for name, value in aircraft.properties:
-            self.model[name] = value
+        prepare(self.model, aircraft)
 
     def set(self, pose: Pose, commands: Commands) -> None:
         """Put the aircraft into a state, with its engines steady.

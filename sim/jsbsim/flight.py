@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ftcc.link.callbacks import NOBODY, register
 from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, load, package, parts_of
-from ftcc.sim.jsbsim.bench import prepare, set_commands, start_engines
+from ftcc.sim.jsbsim.bench import TURBULENCE, prepare, set_commands, start_engines
 from ftcc.sim.jsbsim.controls import Controls
 
 if TYPE_CHECKING:
@@ -112,9 +112,8 @@ class Modelled:
         """Metres per radian of latitude at home."""
         self.east = (_EARTH_RADIUS / math.sqrt(bent) + self.altitude) * math.cos(self.latitude)
         """Metres per radian of longitude at home."""
-        prepare(self.model)
-        for name, value in flown.aircraft.properties:
-            self.model[name] = value
+        prepare(self.model, flown.aircraft)
+        self.turbulence = dict(flown.aircraft.properties).get(TURBULENCE, 0.0)
         self.model["simulation/randomseed"] = (flown.seed * 1000 + uav) % 2**31
         self._read = [self._node(name).get_double_value for name in _READ]
         self._blow = [self._node(name).set_double_value for name in _WIND]
@@ -145,6 +144,7 @@ class Modelled:
         )
         model.run_ic()
         start_engines(model)
+        model[TURBULENCE] = self.turbulence
         state[: len(ModelState._fields)] = self.motion()
 
     def step(self, driven: NDArray[np.float64], state: NDArray[np.float64]) -> None:

@@ -77,7 +77,8 @@ def steady_flight(aircraft: Aircraft, controls: Controls, V: float, altitude: fl
         for name in surfaces
         if not getattr(controls, name).least - 1e-9 <= values[name] <= getattr(controls, name).most + 1e-9
     ]
-    if beyond or max(map(abs, accelerate(found.x))) > _ENOUGH or abs(values["alpha"]) > _LARGEST_ANGLE:
+    steady = max(map(abs, accelerate(found.x))) <= _ENOUGH and abs(values["alpha"]) <= _LARGEST_ANGLE
+    if beyond or not steady:
         why = f": {', '.join(beyond)} would be beyond its travel" if beyond else ""
         raise TrimError(f"{aircraft.title} has no level flight at {V:g} m/s and {altitude:g} m{why}")
     return Steady(

@@ -97,3 +97,26 @@ def test_bad_input_is_one_line(arguments: list[str], message: str) -> None:
     assert done.exit_code == 2
     assert message in done.output
     assert done.output.count("\n") == 1
+
+
+def test_airframe_shows_level_flight_and_modes_of_an_aircraft_of_jsbsim() -> None:
+    done = CliRunner().invoke(app, ["airframe", "jsbsim:c172p", "--airspeed", "40", "--airspeed", "50"])
+    assert done.exit_code == 0, done.output
+    assert "c172p of JSBSim at 1000 m" in done.output
+    assert "Dutch roll" in done.output
+    assert "915." in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["jsbsim:c171"], "JSBSim has no aircraft 'c171'"),
+        (["jsbsim:c172p", "--airspeed", "20"], "no level flight at 20 m/s"),
+        (["jsbsim:c172p", "--coefficient", "all=1.1"], "are for our airframes"),
+        (["jsbsim:c172p", "--altitude", "nan"], "--altitude nan"),
+    ],
+)
+def test_airframe_refuses_in_one_line(arguments: list[str], message: str) -> None:
+    done = CliRunner().invoke(app, ["airframe", *arguments])
+    assert done.exit_code == 2
+    assert message in done.output

@@ -37,6 +37,11 @@ def test_every_aircraft_of_the_swarm_starts_in_level_flight() -> None:
     assert all(spec.flown is None for spec in found.vehicles if spec.kind != "aircraft")
 
 
+def test_another_seed_draws_other_turbulence_of_jsbsim() -> None:
+    found = mission("jsbsim_attitude").with_seed(7)
+    assert {spec.flown.seed for spec in found.vehicles if spec.flown is not None} == {7}
+
+
 def test_a_law_of_positions_flies_it_under_the_inner_loop() -> None:
     found = mission("jsbsim_fire", ("b737",))
     assert found.plant == "jsbsim_guided"

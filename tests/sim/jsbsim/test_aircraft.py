@@ -50,7 +50,7 @@ def modelled(controls: Controls, steady: Steady, chi: float = 0.0) -> tuple[Mode
 def test_steady_flight_is_where_jsbsims_own_trim_is(controls: Controls, steady: Steady) -> None:
     """Its trim holds wings level where ours holds no sideslip: the propeller's share is small."""
     model = load(TRAINER)
-    prepare(model)
+    prepare(model, TRAINER)
     model["ic/h-sl-ft"], model["ic/vt-fps"], model["ic/gamma-deg"] = ALTITUDE / 0.3048, V / 0.3048, 0.0
     set_commands(model, Commands(throttle=0.6))
     model.run_ic()
@@ -220,3 +220,23 @@ def test_a_measurement_does_not_depend_on_those_before() -> None:
     for bench in (fresh, used):
         bench.set(Pose(V, ALTITUDE, 0.02), Commands(throttle=0.6))
     assert used.accelerations() == pytest.approx(fresh.accelerations(), abs=1e-6)
+
+
+def test_turbulence_of_jsbsims_own_is_drawn_by_the_seed() -> None:
+    rough = Aircraft("c172p", (("atmosphere/turb-type", 4.0), ("atmosphere/turbulence/milspec/severity", 4.0)))
+    controls = controls_of(rough, V, ALTITUDE)
+    steady = steady_flight(rough, controls, V, ALTITUDE)
+    ends = []
+    for seed in (1, 1, 2):
+        model = Modelled(FlownAircraft(rough, controls, HOME, ALTITUDE, 5000, seed), 1)
+        pose = body_attitude(0.0, 0.0, steady.mu, steady.alpha, 0.0)
+        state = np.array([0.0, 0.0, ALTITUDE - HOME[2], V, 0.0, 0.0, *pose, 0.0, 0.0, 0.0])
+        driven = np.array([steady.aileron, steady.elevator, steady.rudder, steady.thrust, 0.0, 0.0, 0.0])
+        model.begin(state, driven)
+        for _ in range(400):
+            model.step(driven, state)
+        ends.append(state)
+    same, again, other = ends
+    assert np.isfinite(ends).all()
+    assert (same == again).all()
+    assert np.abs(other - same).max() > 0.01
