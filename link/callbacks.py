@@ -1,7 +1,7 @@
 """Python functions that compiled code calls by their address.
 
 Compiled functions are kept on disk, so they cannot hold a Python function. They get its address in an array, and call
-it with two integers; the numbers that matter lie in arrays that both sides know. A call costs about a microsecond.
+it with an integer; the numbers that matter lie in arrays that both sides know. A call costs about a microsecond.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ __all__ = ["NOBODY", "call", "register"]
 NOBODY = 0
 """Address of no function."""
 
-Function = Callable[[int, int], None]
+Function = Callable[[int], None]
 
-_signature = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)
+_signature = ctypes.CFUNCTYPE(None, ctypes.c_int64)
 _registered: dict[int, tuple[object, Function]] = {}
 
 
 def register(function: Function) -> NDArray[np.int64]:
-    """Return the address of ``function(first, second)``, as an array (1,); it can be called as long as that lives.
+    """Return the address of ``function(number)``, as an array (1,); it can be called as long as that lives.
 
     An exception in ``function`` would be lost: it must catch and keep what it raises.
     """
@@ -40,11 +40,11 @@ def register(function: Function) -> NDArray[np.int64]:
     return holder
 
 
-def call(address, first, second):
-    """Call the function at ``address``, which `register` gave, with two integers."""
-    _registered[int(address)][1](int(first), int(second))
+def call(address, number):
+    """Call the function at ``address``, which `register` gave, with an integer."""
+    _registered[int(address)][1](int(number))
 
 
 @when_compiled(call)
-def _call(address, first, second):
-    call_by_address(address, first, second)
+def _call(address, number):
+    call_by_address(address, number)

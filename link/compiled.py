@@ -197,16 +197,16 @@ def external(name: str, result: str, *arguments: str) -> Any:
 
 
 @intrinsic
-def call_by_address(_context, address, first, second):
-    """In compiled code: call the C function ``void (int64, int64)`` at ``address``, see `callbacks`."""
+def call_by_address(_context, address, number):
+    """In compiled code: call the C function ``void (int64)`` at ``address``, see `callbacks`."""
 
     def generate(context, builder, signature, arguments):
         whole = ir.IntType(64)
-        kind = ir.FunctionType(ir.VoidType(), [whole, whole])
+        kind = ir.FunctionType(ir.VoidType(), [whole])
         builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
         return context.get_dummy_value()
 
-    return types.void(types.int64, types.int64, types.int64), generate
+    return types.void(types.int64, types.int64), generate
 
 
 def when_compiled(function: Callable[..., Any]) -> Callable[[F], F]:

@@ -44,7 +44,7 @@ _CHANNELS = len(plant.DISTURBANCES)
 _MOVES = tuple(name for name, _ in plant.DISTURBANCES[-len(AIR) :]) == AIR
 """Whether the plant flies in air that may move."""
 _MODELLED = hasattr(plant, "driven")
-"""Whether an external model flies the vehicle: the plant's ``rates`` then move only what stands before the model."""
+"""Whether an external model flies the vehicle: the plant's ``rates`` then move only what is not the model's."""
 _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
 
 
@@ -148,7 +148,7 @@ if _MODELLED:
         """Let the external model fly a step under the deflections and disturbances ``d`` of its end."""
         acting = fields(_Inputs, fleet.deflection[i])
         store(_driven(fields(_State, fleet.state[i]), acting, d, parameters), fleet.driven[i])
-        call(fleet.model[0], i, 0)
+        call(fleet.model[0], i)
 
 else:
 

@@ -24,12 +24,11 @@ from ftcc.link.recording import Column, Recorder, is_full, part_path
 from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, HELD, WORK
 from ftcc.link.wire import connect, keep_sent, send_again, split
-from ftcc.sim.fleet import Fleet
 from ftcc.sim.group import VehicleGroup, build_group
 from ftcc.sim.injection import faults_of, inject
-from ftcc.sim.jsbsim.flight import trouble_of
+from ftcc.sim.jsbsim.flight import lost_text
 from ftcc.sim.obstacles import entered_text
-from ftcc.sim.plant import DIVERGED, LOST, TRUTH, UNITS
+from ftcc.sim.plant import DIVERGED, TRUTH, UNITS
 from ftcc.sim.plants import conditions_of, find, flight_of
 from ftcc.sim.spec import VehicleSpec
 
@@ -258,19 +257,13 @@ class Vehicles:
         datagram = self.pilots[i].pack(ending_message())
         keep_sent(self.group.wire, i, datagram)
         send_again(self.group.wire, i)
-        self.gate.report(Lost(self.specs[i].uav, at_us, lost_text(self.group.fleet, i, why)))
+        self.gate.report(Lost(self.specs[i].uav, at_us, lost_text(self.group.fleet.model, i, why)))
 
     def close(self) -> None:
         """Free the ports."""
         for endpoint in (*self.pilots, *self.station):
             endpoint.close()
         self.waiter.close()
-
-
-def lost_text(fleet: Fleet, i: int, why: int) -> str:
-    """Say why vehicle ``i`` was lost, a key of ``plant.LOST``, with what its external model has to say."""
-    trouble = trouble_of(fleet.model, i)
-    return f"{LOST[why]}: {trouble}" if trouble else LOST[why]
 
 
 def load_compiled(group: VehicleGroup, timing: Timing, flight: ModuleType) -> None:

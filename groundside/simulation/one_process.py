@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import psutil  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.law_errors import describe_error, describe_not_finite
@@ -28,8 +29,9 @@ from ftcc.groundside.simulation.flight import Flight
 from ftcc.groundside.simulation.space import recording_size, require_space
 from ftcc.link.compiled import entry_of, instantiate, uncompile
 from ftcc.link.events import drain_events
+from ftcc.sim.jsbsim.flight import lost_text
 from ftcc.sim.obstacles import entered_text
-from ftcc.sim.plant import DIVERGED, LOST
+from ftcc.sim.plant import DIVERGED
 from ftcc.sim.plants import conditions_of, cycle_of
 
 __all__ = ["LawError", "PlainPython", "Progress", "defer_interrupt", "fly_in_memory", "fly_in_parts", "loop_of"]
@@ -104,7 +106,7 @@ def fly_in_parts(
     loop = loop_of(mission.scheme.name, mission.plant, is_active(mission.autopilots))
     kept = list(places_kept(mission, columns).values())
     world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
-    flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording)
+    flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording, world.fleet.model)
     loop.fly_ticks(world, timing, mission.wire, 0, 0)
     fly_ticks = entry_of(loop.fly_ticks, world, timing, mission.wire, 0, 0)
     if ready is not None:
@@ -165,6 +167,7 @@ def _flight_so_far(
     mission: Mission,
     columns: Collection[str] | None,
     recording: Any,
+    models: NDArray[np.int64],
     begin: int,
     end: int,
     events: list[tuple[float, int, str, str]],
@@ -184,7 +187,7 @@ def _flight_so_far(
         links=recording.links[:reports],
         t=np.arange(row, row + rows) * timing.record_every * timing.period_us / 1e6,
         lost={
-            uav: (float(recording.lost_us[i] / 1e6), LOST[int(recording.lost[i])])
+            uav: (float(recording.lost_us[i] / 1e6), lost_text(models, i, int(recording.lost[i])))
             for i, uav in enumerate(mission.uavs)
             if recording.lost[i] > 0
         },

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from ftcc.link.actuators import ACTUATORS
 from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError
 from ftcc.sim.jsbsim.bench import Bench, Commands, Pose, throttles_of
 
@@ -48,9 +50,17 @@ class Control:
 
     def command(self, effect: float) -> float:
         """Return the command for a deflection or thrust, the nearest possible one."""
+        effects, commands = self._rising
+        n = min(max(bisect.bisect_right(effects, effect), 1), len(effects) - 1)
+        share = (effect - effects[n - 1]) / (effects[n] - effects[n - 1]) if len(effects) > 1 else 0.0
+        return commands[n - 1] + min(max(share, 0.0), 1.0) * (commands[n] - commands[n - 1])
+
+    @functools.cached_property
+    def _rising(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Effects, ascending, and their commands."""
         if self.effects[0] < self.effects[-1]:
-            return float(np.interp(effect, self.effects, self.commands))
-        return float(np.interp(effect, self.effects[::-1], self.commands[::-1]))
+            return self.effects, self.commands
+        return self.effects[::-1], self.commands[::-1]
 
 
 NO_CONTROL = Control((0.0,), (0.0,))
@@ -69,7 +79,7 @@ class Controls:
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of the actuators that the aircraft does not have."""
-        return tuple(name for name in ("aileron", "elevator", "rudder", "thrust") if getattr(self, name) == NO_CONTROL)
+        return tuple(name for name in ACTUATORS if getattr(self, name) == NO_CONTROL)
 
     def commands(self, aileron: float, elevator: float, rudder: float, thrust: float) -> Commands:
         """Return the commands for deflections (rad) and thrust (N)."""

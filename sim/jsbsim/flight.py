@@ -15,11 +15,12 @@ from ftcc.link.callbacks import NOBODY, register
 from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, load, package, parts_of
 from ftcc.sim.jsbsim.bench import TURBULENCE, prepare, set_commands, start_engines
 from ftcc.sim.jsbsim.controls import Controls
+from ftcc.sim.plant import LOST
 
 if TYPE_CHECKING:
     import jsbsim
 
-__all__ = ["Driven", "FlownAircraft", "ModelState", "Modelled", "preload", "start_models", "trouble_of"]
+__all__ = ["Driven", "FlownAircraft", "ModelState", "Modelled", "lost_text", "preload", "start_models", "trouble_of"]
 
 _EARTH_RADIUS, _FLATTENING = 6_378_137.0, 1.0 / 298.257223563
 """WGS 84."""
@@ -195,7 +196,7 @@ def start_models(
 ) -> NDArray[np.int64]:
     """Load and start the models of a fleet; return the address (1,) of the function that flies one for a step.
 
-    It takes the number of a vehicle, and nothing; models live as long as the array.
+    It takes the number of a vehicle; models live as long as the array.
 
     Parameters
     ----------
@@ -215,7 +216,7 @@ def start_models(
         if model is not None:
             model.begin(state[i], driven[i])
 
-    def fly(i: int, _: int) -> None:
+    def fly(i: int) -> None:
         model = models[i]
         assert model is not None
         model.step(driven[i], state[i])
@@ -231,6 +232,12 @@ def trouble_of(address: NDArray[np.int64], i: int) -> str:
     models = _flown.get(int(address[0]))
     model = models[i] if models else None
     return model.trouble if model is not None else ""
+
+
+def lost_text(address: NDArray[np.int64], i: int, why: int) -> str:
+    """Say why vehicle ``i`` of a fleet was lost, a key of ``plant.LOST``, with what its model has to say."""
+    trouble = trouble_of(address, i)
+    return f"{LOST[why]}: {trouble}" if trouble else LOST[why]
 
 
 def preload() -> None:
