@@ -51,7 +51,7 @@ def scaled(airframe: Airframe, factors: Mapping[str, float]) -> Airframe:
 
 
 @compiled
-def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
+def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a, q_g=0.0):
     """Rates of (V, x, z, gamma, theta, q), eqs. (2.8)-(2.12) with the elevator's lift and T sin(alpha).
 
     Parameters
@@ -63,6 +63,8 @@ def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
     d1, d2, d3 : float
         Disturbances of V (m/s^2), gamma (rad/s) and q (rad/s^2).
     a : Airframe
+    q_g : float
+        Pitch rate of the air, rad/s: damping follows the rate against it, see `ftcc.sim.turning_air`.
     """
     alpha = theta - gamma
     lifting = 0.5 * a.rho * V * V * a.S
@@ -70,7 +72,7 @@ def longitudinal_rates(V, gamma, theta, q, thrust, elevator, d1, d2, d3, a):
     cos_gamma = math.cos(gamma)
     drag = lifting * (a.CD0 + a.CDa * alpha + a.CDa2 * alpha * alpha)
     lift = lifting * (a.CL0 + a.CLa * alpha + a.CLde * elevator)
-    moment = lifting * a.c * (a.Cm0 + a.Cma * alpha + a.Cmde * elevator + a.Cmq * a.c * q / (2.0 * V))
+    moment = lifting * a.c * (a.Cm0 + a.Cma * alpha + a.Cmde * elevator + a.Cmq * a.c * (q - q_g) / (2.0 * V))
     return (
         (thrust * math.cos(alpha) - drag) / a.m - a.g * sin_gamma + d1,
         V * cos_gamma,
@@ -100,7 +102,9 @@ def turning_rates(gamma, mu, alpha, beta, p, q, r, chi_dot, gamma_dot):
 
 
 @compiled
-def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder, thrust, d1, d2, d3, a):
+def attitude_rates(
+    V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder, thrust, d1, d2, d3, a, p_g=0.0, q_g=0.0, r_g=0.0
+):
     """Rates of (V, chi, gamma, mu, alpha, beta, p, q, r), eqs. (2.2)-(2.7).
 
     Parameters
@@ -116,6 +120,8 @@ def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder
     d1, d2, d3 : float
         Disturbances of V (m/s^2), gamma (rad/s) and q (rad/s^2).
     a : Airframe
+    p_g, q_g, r_g : float
+        Rotation of the air about the body axes, rad/s: damping follows the rates against it.
     """
     sin_alpha, cos_alpha = math.sin(alpha), math.cos(alpha)
     sin_beta, cos_beta = math.sin(beta), math.cos(beta)
@@ -128,11 +134,11 @@ def attitude_rates(V, gamma, mu, alpha, beta, p, q, r, aileron, elevator, rudder
     lift = lifting * (a.CL0 + a.CLa * alpha + a.CLde * elevator)
     side = lifting * (a.CY0 + a.CYb * beta)
     rolling = lifting * a.b * (
-        a.Cl0 + a.Clb * beta + a.Clda * aileron + a.Cldr * rudder + half_span * (a.Clp * p + a.Clr * r)
+        a.Cl0 + a.Clb * beta + a.Clda * aileron + a.Cldr * rudder + half_span * (a.Clp * (p - p_g) + a.Clr * (r - r_g))
     )  # fmt: skip
-    pitching = lifting * a.c * (a.Cm0 + a.Cma * alpha + a.Cmde * elevator + a.Cmq * a.c * q / (2.0 * V))
+    pitching = lifting * a.c * (a.Cm0 + a.Cma * alpha + a.Cmde * elevator + a.Cmq * a.c * (q - q_g) / (2.0 * V))
     yawing = lifting * a.b * (
-        a.Cn0 + a.Cnb * beta + a.Cnda * aileron + a.Cndr * rudder + half_span * (a.Cnp * p + a.Cnr * r)
+        a.Cn0 + a.Cnb * beta + a.Cnda * aileron + a.Cndr * rudder + half_span * (a.Cnp * (p - p_g) + a.Cnr * (r - r_g))
     )  # fmt: skip
     # Flight path, (2.2).
     momentum = a.m * V

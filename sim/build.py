@@ -22,6 +22,7 @@ from ftcc.sim.obstacles import zones_of
 from ftcc.sim.plant import TRUTH
 from ftcc.sim.plants import find
 from ftcc.sim.spec import VehicleSpec
+from ftcc.sim.turning_air import begin, filters, turns
 from ftcc.sim.wind import NO_TURBULENCE, DiscreteGust, dryden, settled
 
 __all__ = ["build_fleet"]
@@ -59,6 +60,7 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
     command = np.array([spec.command for spec in specs], np.float64)
     limits = np.array([spec.limits for spec in specs], np.float64)
     state = np.array([spec.initial for spec in specs], np.float64)
+    gusts = [settled(spec.turbulence, spec.uav) for spec in specs]
     driven = np.array([_driven_at_start(spec, plant) for spec in specs])
     fleet = Fleet(
         state=state,
@@ -78,7 +80,10 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),
         gusts=_padded([spec.discrete_gusts for spec in specs], len(DiscreteGust._fields)),
         dryden=np.array([dryden(spec.turbulence) for spec in specs]),
-        turbulence=np.array([settled(spec.turbulence, spec.uav) for spec in specs]),
+        turbulence=np.array(gusts),
+        turns=np.array([int(turns(spec.turbulence)) for spec in specs], np.int64),
+        turning=np.array([filters(spec.turbulence) for spec in specs]),
+        turned=np.array([begin(spec.turbulence, spec.uav, states) for spec, states in zip(specs, gusts, strict=True)]),
         still=np.array([int(not spec.discrete_gusts and spec.turbulence == NO_TURBULENCE) for spec in specs], np.int64),
         turbulence_seed=np.array([spec.turbulence.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),
@@ -107,7 +112,7 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
         events=new_events(),
         autothrottle=np.array([spec.autothrottle for spec in specs], np.float64),
         speed_hold=np.array([spec.autothrottle.thrust for spec in specs], np.float64),
-        disturbed=np.zeros((k, len(plant.DISTURBANCES))),
+        disturbed=np.zeros((k, len(plant.Disturbances._fields))),
         driven=driven,
         model=start_models([spec.flown for spec in specs], [spec.uav for spec in specs], state, driven),
     )

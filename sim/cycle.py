@@ -21,6 +21,7 @@ from ftcc.sim.navigation import navigate
 from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import ALPHA, CHI, GAMMA, THETA, Guards, V, X, Y, Z
 from ftcc.sim.sensors import add_noise, encode_state
+from ftcc.sim.turning_air import ROTATION, rotation
 from ftcc.sim.wind import AIR, blow, moving_air
 
 __all__ = ["actuate", "advance", "conditions", "measure", "sense", "truth"]
@@ -43,6 +44,8 @@ _SLOTS = tuple(SLOT[name] for name in plant.ACTUATORS)
 _CHANNELS = len(plant.DISTURBANCES)
 _MOVES = tuple(name for name, _ in plant.DISTURBANCES[-len(AIR) :]) == AIR
 """Whether the plant flies in air that may move."""
+_TURNS = plant.Disturbances._fields[-len(ROTATION) :] == ROTATION
+"""Whether the air that the plant flies in may turn, too."""
 _MODELLED = hasattr(plant, "driven")
 """Whether an external model flies the vehicle: the plant's ``rates`` then move only what is not the model's."""
 _GUST = next((n for n, (name, _) in enumerate(plant.DISTURBANCES) if name == "gust"), -1)
@@ -83,6 +86,12 @@ def _move_air(fleet, i, time, out):
 
 
 @compiled_apart
+def _turn_air(fleet, i, out):
+    """Write the rotation of the air at vehicle ``i`` into the last of ``out``, a plant's ``Disturbances``."""
+    rotation(fleet, i, out[_CHANNELS:])
+
+
+@compiled_apart
 def _gusts(fleet, i, time):
     return gust(fleet, i, time)
 
@@ -117,6 +126,8 @@ def _disturbances(fleet, i, time):
     """The disturbances of a step whose middle is at ``time`` (s)."""
     disturbed = fleet.disturbed[i]
     _disturb(fleet, i, time, disturbed)
+    if _TURNS and fleet.turns[i] == 1:
+        _turn_air(fleet, i, disturbed)
     if _GUST >= 0 and fleet.gust_deviation[i] > 0.0:
         disturbed[_GUST] += _gusts(fleet, i, time)
     return fields(_Disturbances, disturbed)

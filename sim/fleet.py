@@ -78,6 +78,12 @@ class Fleet(NamedTuple):
     """(k, 3, 6): see ``wind.DrydenFilter``; zeros without turbulence."""
     turbulence: NDArray[np.float64]
     """(k, 3, 2): the states of its filters."""
+    turns: NDArray[np.int64]
+    """(k,): 1 where the air of the turbulence turns."""
+    turning: NDArray[np.float64]
+    """(k, 3, 7): see ``turning_air.TurnFilter``; zeros where it does not."""
+    turned: NDArray[np.float64]
+    """(k, 3): the states of its filters."""
     turbulence_seed: NDArray[np.int64]
     """(k,)."""
     still: NDArray[np.int64]
@@ -111,7 +117,7 @@ class Fleet(NamedTuple):
     speed_hold: NDArray[np.float64]
     """(k,): the thrust that it sets at present, N."""
     disturbed: NDArray[np.float64]
-    """(k, d): room for the disturbances of a step."""
+    """(k, d): room for the disturbances of a step, see the plant's ``Disturbances``."""
     driven: NDArray[np.float64]
     """(k, 7): what a vehicle's external model gets for a step, see ``jsbsim.flight.Driven``."""
     model: NDArray[np.int64]

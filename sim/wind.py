@@ -1,8 +1,8 @@
 """Moving air: the mean wind of chapter 9, discrete gusts, Dryden turbulence, and motion relative to the air.
 
-Gusts and turbulence have three components: along the track (tail wind > 0), to its right, and up, m/s. Aircraft are
-small against them: the air moves as a whole, its gradients over span and length (p_g, q_g, r_g of MIL-F-8785C) are
-neglected. Distances become times by the speed that the scenario gives: the field is frozen and flown through steadily.
+Gusts and turbulence have three components: along the track (tail wind > 0), to its right, and up, m/s. The air moves
+as a whole; gradients of turbulence over span and length are in `ftcc.sim.turning_air`, where a scenario wants them.
+Distances become times by the speed that the scenario gives: the field is frozen and flown through steadily.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ftcc.link.compiled import compiled, compiled_within, fields
 from ftcc.link.philox import TURBULENCE, gaussian_pair, philox
 from ftcc.link.rotation import body_axes
+from ftcc.sim.turning_air import NOT_TURNING, TurningAir, turn
 
 __all__ = [
     "AIR",
@@ -64,6 +65,7 @@ class Turbulence(NamedTuple):
     step_us: int = 1000
     """Integration step of the plant, us, for which a value is held."""
     seed: int = 0
+    turning: TurningAir = NOT_TURNING
 
 
 NO_TURBULENCE = Turbulence()
@@ -143,6 +145,8 @@ def blow(fleet, i, step):
     """Bring the turbulence of vehicle ``i`` to the beginning of this step, counted from 1, of its plant."""
     rows = fleet.dryden[i]
     n0, n1, n2, n3, n4, n5 = _normal(fleet.turbulence_seed[i], step, fleet.uav[i])
+    if fleet.turns[i] == 1:
+        turn(fleet, i, step, n4, n5, n2, n3)
     _drive(fleet.turbulence[i, 0], rows[0], n0, n1)
     _drive(fleet.turbulence[i, 1], rows[1], n2, n3)
     _drive(fleet.turbulence[i, 2], rows[2], n4, n5)

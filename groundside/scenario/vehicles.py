@@ -151,7 +151,7 @@ def _aircraft(
         holds_first=isinstance(plan.plant.initial_actuators, dict),
         gust=gust(plan),
         discrete_gusts=discrete_gusts(plan, uav, start["V"], findings),
-        turbulence=turbulence(plan, uav, start["V"], timing),
+        turbulence=turbulence(plan, uav, start["V"], getattr(true, "b", 0.0), timing),
         attitude_code=code,
         fault_before_lag=plan.plant.fault == "before_lag",
         faults=actuator_faults(plan, uav),

@@ -9,9 +9,11 @@ from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.schema import Plan, TurbulenceFields
 from ftcc.link.timing import Timing
 from ftcc.sim.disturbances import Disturbance, Gust
+from ftcc.sim.plants import name_of
+from ftcc.sim.turning_air import NOT_TURNING, ROTATION, TurningAir
 from ftcc.sim.wind import AIR, NO_TURBULENCE, DiscreteGust, Turbulence
 
-__all__ = ["check_wind", "discrete_gusts", "gust", "low_altitude", "mean_wind", "turbulence", "wind_texts"]
+__all__ = ["check_wind", "discrete_gusts", "gust", "low_altitude", "mean_wind", "turbulence", "turning_air", "wind_texts"]
 
 _FOOT = 0.3048
 
@@ -22,6 +24,10 @@ def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
     for table, needed in (("wind", ("wind", "gust")), ("gusts", AIR), ("turbulence", AIR)):
         if getattr(plan, table) and not {*needed} <= {*channels}:
             findings.refuse(f"{table}: the plant flies in still air")
+    turning = plan.turbulence is not None and plan.turbulence.turning
+    if turning and plant.Disturbances._fields[-len(ROTATION) :] != ROTATION:
+        why = "flies by JSBSim, which takes no rotation" if hasattr(plant, "driven") else "has no body rates"
+        findings.refuse(f"turbulence.turning = true: plant {name_of(plant)} {why}; leave it out")
     named = [(f"gusts.{n}.uavs", gust.uavs) for n, gust in enumerate(plan.gusts)]
     named += [("turbulence.uavs", plan.turbulence.uavs)] if plan.turbulence is not None else []
     for where, uavs in named:
@@ -62,14 +68,16 @@ def discrete_gusts(plan: Plan, uav: int, V: float, findings: Findings) -> tuple[
     return tuple(found)
 
 
-def turbulence(plan: Plan, uav: int, V: float, timing: Timing) -> Turbulence:
-    """Return the turbulence of UAV ``uav``, whose initial airspeed is ``V`` (m/s)."""
+def turbulence(plan: Plan, uav: int, V: float, span: float, timing: Timing) -> Turbulence:
+    """Return the turbulence of UAV ``uav`` with that ``span`` (m), whose initial airspeed is ``V`` (m/s)."""
     fields = plan.turbulence
     if fields is None or (fields.uavs is not None and uav not in fields.uavs):
         return NO_TURBULENCE
     sigma, length = _sizes(fields)
-    u, v, w = ((fields.airspeed or V) / along for along in length)
-    return Turbulence(sigma, (u, v, w), timing.step_us, plan.seed)
+    V = fields.airspeed or V
+    u, v, w = (V / along for along in length)
+    turning = turning_air(sigma[2], length[2], span, V) if fields.turning and span > 0.0 else NOT_TURNING
+    return Turbulence(sigma, (u, v, w), timing.step_us, plan.seed, turning)
 
 
 def _sizes(fields: TurbulenceFields) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -97,6 +105,25 @@ def low_altitude(wind: float, altitude: float) -> tuple[tuple[float, float, floa
     up, level = 0.1 * wind, 0.1 * wind / slope**0.4
     length = h / slope**1.2 * _FOOT
     return (level, level, up), (length, length, altitude)
+
+
+def turning_air(deviation: float, length: float, span: float, V: float) -> TurningAir:
+    """Return how the air turns, for standard deviation (m/s) and scale length (m) of the gusts upwards.
+
+    Source: MIL-F-8785C, 3.7.5: the square of sigma is the integral of the spectrum of p_g, see `ftcc.sim.turning_air`.
+
+    Parameters
+    ----------
+    deviation, length : float
+        sigma_w, m/s, and L_w, m.
+    span : float
+        Of the aircraft, m.
+    V : float
+        Airspeed, m/s.
+    """
+    wide = 4.0 * span / math.pi
+    variance = deviation**2 / length * 0.8 * (length / wide) ** (1.0 / 3.0) * 0.5 * math.pi / wide
+    return TurningAir(math.sqrt(variance), (V / wide, V / wide, V / (0.75 * wide)), V)
 
 
 def wind_texts(plan: Plan) -> list[tuple[float, int | None, str]]:

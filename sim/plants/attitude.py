@@ -35,6 +35,7 @@ from ftcc.sim.plant import (
     Z,
 )
 from ftcc.sim.plants.longitudinal import DISTURBANCES, Disturbances, level
+from ftcc.sim.turning_air import about_body_axes
 from ftcc.sim.wind import acceleration, against, wind_speed
 
 __all__ = [
@@ -104,9 +105,12 @@ def _rates_in_wind(s, u, d, a):
         s.V * cg * sc - d.wind_along * sc - d.wind_right * cc,
         s.V * sg - d.wind_up,
     )  # fmt: skip
+    p_g, q_g, r_g = d.p_g, d.q_g, d.r_g
+    if p_g != 0.0 or q_g != 0.0 or r_g != 0.0:
+        p_g, q_g, r_g = about_body_axes(q0, q1, q2, q3, cc, sc, p_g, q_g, r_g)
     speed_rate, chi_rate, gamma_rate, _, _, _, p_dot, q_dot, r_dot = attitude_rates(
         speed, gamma, mu, alpha, beta, s.p, s.q, s.r,
-        u.aileron, u.elevator, u.rudder, u.thrust, 0.0, 0.0, d.d3, a,
+        u.aileron, u.elevator, u.rudder, u.thrust, 0.0, 0.0, d.d3, a, p_g, q_g, r_g,
     )  # fmt: skip
     # The rates of the air path in still air are the acceleration on its triad, whatever the wind does.
     north, east, up = acceleration(speed, gamma, chi, speed_rate, gamma_rate, chi_rate)

@@ -33,8 +33,9 @@ from ftcc.sim.plant import (
     Z,
 )
 from ftcc.sim.plants.attitude import COMPLETED, complete
-from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Disturbances, Inputs
+from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Inputs
 from ftcc.sim.trim import trim
+from ftcc.sim.turning_air import about_body_axes
 from ftcc.sim.wind import acceleration, against, wind_speed
 
 __all__ = [
@@ -103,6 +104,22 @@ class State(NamedTuple):
     integral: float
 
 
+class Disturbances(NamedTuple):
+    """See `DISTURBANCES`; then the rotation of the air, rad/s."""
+
+    b_x: float
+    b_y: float
+    b_z: float
+    wind: float = 0.0
+    gust: float = 0.0
+    wind_along: float = 0.0
+    wind_right: float = 0.0
+    wind_up: float = 0.0
+    p_g: float = 0.0
+    q_g: float = 0.0
+    r_g: float = 0.0
+
+
 class Level(NamedTuple):
     """Level flight in still air."""
 
@@ -135,16 +152,20 @@ def rates(s, u, d, a):
     """Rates of `State` under the demands ``u`` and disturbances ``d`` of the airframe ``a``; the wind blows north."""
     thrust = max(u.thrust, 0.0)
     vx, vy, vz = s.vx - wind_speed(s.z, d.wind, d.gust), s.vy, s.vz
+    p_g, q_g, r_g = d.p_g, d.q_g, d.r_g
     if d.wind_along != 0.0 or d.wind_right != 0.0 or d.wind_up != 0.0:
         ground = math.sqrt(s.vx * s.vx + s.vy * s.vy)
         cos_chi, sin_chi = s.vx / ground, s.vy / ground
         vx -= d.wind_along * cos_chi - d.wind_right * sin_chi
         vy -= d.wind_along * sin_chi + d.wind_right * cos_chi
         vz -= d.wind_up
+        if p_g != 0.0 or q_g != 0.0 or r_g != 0.0:
+            p_g, q_g, r_g = about_body_axes(s.q0, s.q1, s.q2, s.q3, cos_chi, sin_chi, p_g, q_g, r_g)
     speed, gamma, chi, mu, alpha, beta = _against(s, vx, vy, vz)
     V_dot, chi_dot, gamma_dot, _, _, _, p_dot, q_dot, r_dot = attitude_rates(
-        speed, gamma, mu, alpha, beta, s.p, s.q, s.r, s.aileron, s.elevator, s.rudder, thrust, 0.0, 0.0, 0.0, a
-    )
+        speed, gamma, mu, alpha, beta, s.p, s.q, s.r,
+        s.aileron, s.elevator, s.rudder, thrust, 0.0, 0.0, 0.0, a, p_g, q_g, r_g,
+    )  # fmt: skip
     # The rates of the air path in still air are the acceleration on its triad, whatever the wind does.
     north, east, up = acceleration(speed, gamma, chi, V_dot, gamma_dot, chi_dot)
     loop = LoopState(s.n_r, s.n_r_dot, s.mu_r, s.integral)

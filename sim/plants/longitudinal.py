@@ -55,7 +55,7 @@ class State(NamedTuple):
 
 
 class Disturbances(NamedTuple):
-    """Added to the rates, and the motion of the air, see `DISTURBANCES`."""
+    """Added to the rates, and the motion of the air, see `DISTURBANCES`; then its rotation, rad/s."""
 
     d1: float
     d2: float
@@ -65,6 +65,9 @@ class Disturbances(NamedTuple):
     wind_along: float = 0.0
     wind_right: float = 0.0
     wind_up: float = 0.0
+    p_g: float = 0.0
+    q_g: float = 0.0
+    r_g: float = 0.0
 
 
 Inputs = Deflections
@@ -85,7 +88,7 @@ def _rates_in_wind(s, u, d, a):
     speed, gamma = math.sqrt(forward * forward + climb * climb), math.atan2(climb, forward)
     # The rates of the air path in still air are the acceleration along and across it, whatever the wind does.
     along, _, _, turning, _, q_dot = longitudinal_rates(
-        speed, gamma, s.theta, s.q, u.thrust, u.elevator, 0.0, 0.0, d.d3, a
+        speed, gamma, s.theta, s.q, u.thrust, u.elevator, 0.0, 0.0, d.d3, a, d.q_g
     )
     across, apart = speed * turning, gamma - s.gamma
     return (

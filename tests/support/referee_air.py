@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.groundside.jsbsim import write_aircraft
-from ftcc.groundside.scenario.wind import low_altitude
+from ftcc.groundside.scenario.wind import low_altitude, turning_air
 from ftcc.link.compiled import compiled
 from ftcc.sim.build import build_fleet
 from ftcc.sim.fleet import Fleet
 from ftcc.sim.plants import cycle_of
 from ftcc.sim.plants.attitude import State
+from ftcc.sim.turning_air import NOT_TURNING, TurningAir, rotation
 from ftcc.sim.wind import Turbulence, blow, moving_air
 from tests.support import referee
-from tests.support.referee import FOOT
+from tests.support.referee import AIRFRAME, FOOT
 from tests.support.swarm import vehicle
 
 MILSPEC, TUSTIN = 3, 4
@@ -112,19 +114,49 @@ def rates_of_jsbsim(
     return np.array(rows)
 
 
-def our_rates(seed: int, seconds: float, *, altitude: float, wind: float) -> NDArray[np.float64]:
-    """The same of our aircraft in our turbulence."""
+def our_turning(deviation: Triple, length: Triple) -> TurningAir:
+    """How our air turns for our aircraft, as the specification has it."""
+    return turning_air(deviation[2], length[2], AIRFRAME.b, SPEED)
+
+
+def jsbsims_turning(deviation: Triple, length: Triple) -> TurningAir:
+    """The same with JSBSim's p_g, that of MIL-STD-1797A: sigma = 1.9 sigma_w / sqrt(L_w b), scale sqrt(L_w b) / 2.6."""
+    root = math.sqrt(length[2] * AIRFRAME.b)
+    ours = our_turning(deviation, length)
+    return ours._replace(
+        deviation=1.9 * deviation[2] / root, bandwidth=(2.6 * SPEED / root, ours.bandwidth[1], ours.bandwidth[2])
+    )
+
+
+def reverse_pitch(fleet: Fleet) -> None:
+    """Give q_g the sign that it has in JSBSim: nose up where the air *sinks* faster ahead."""
+    fleet.turning[:, 1, 0] *= -1.0
+
+
+def our_rates(
+    seed: int,
+    seconds: float,
+    *,
+    altitude: float,
+    wind: float,
+    turning: Callable[[Triple, Triple], TurningAir] | None = None,
+    reversed_pitch: bool = False,
+) -> NDArray[np.float64]:
+    """The same of our aircraft in our turbulence, whose air turns as ``turning`` says; None: it does not."""
     deviation, length = low_altitude(wind, altitude)
     along, right, up = (SPEED / one for one in length)
+    rotating = NOT_TURNING if turning is None else turning(deviation, length)
     steady, level = referee.start_of(referee.Case("", V=SPEED))
     spec = vehicle(
         plant="attitude",
         initial=level._replace(z=altitude),
         command=(0.0, steady.elevator, 0.0, steady.thrust),
         limits=tuple((one.lowest, one.highest) for one in referee.STILL.values()),
-        turbulence=Turbulence(deviation, (along, right, up), 1000, seed),
+        turbulence=Turbulence(deviation, (along, right, up), 1000, seed, rotating),
     )
     fleet, cycle = build_fleet([spec]), cycle_of("attitude")
+    if reversed_pitch:
+        reverse_pitch(fleet)
     rows = []
     for k in range(round(100 * seconds)):
         assert cycle.advance(fleet, 0, 10_000 * k, 10_000, 1000) == 0
@@ -134,22 +166,23 @@ def our_rates(seed: int, seconds: float, *, altitude: float, wind: float) -> NDA
 
 
 @compiled
-def _blown(fleet, first, out):
+def _blown(fleet, first, out, turning):
     for k in range(out.shape[0]):
         blow(fleet, 0, first + k + 1)
         for component in range(3):
             out[k, component] = moving_air(fleet, 0, component, 0.0)
+        rotation(fleet, 0, turning[k])
 
 
-def our_air(steps: int, dt: float, deviation: Triple, length: Triple) -> NDArray[np.float64]:
-    """Our turbulence (steps, 3) along, right, up, m/s, for standard deviations (m/s) and scale lengths (m)."""
+def our_air(steps: int, dt: float, deviation: Triple, length: Triple) -> Air:
+    """Our turbulence for standard deviations (m/s) and scale lengths (m): along, right, up."""
     along, right, up = (SPEED / one for one in length)
-    turbulence = Turbulence(deviation, (along, right, up), round(dt * 1e6), seed=1)
+    turbulence = Turbulence(deviation, (along, right, up), round(dt * 1e6), 1, our_turning(deviation, length))
     level = referee.start_of(referee.Case("", V=SPEED))[1]
     fleet: Fleet = build_fleet([vehicle(plant="attitude", initial=level, turbulence=turbulence)])
-    out = np.empty((steps, 3))
-    _blown(fleet, 0, out)
-    return out
+    speed, turned = np.empty((steps, 3)), np.empty((steps, 3))
+    _blown(fleet, 0, speed, turned)
+    return Air(speed, turned)
 
 
 def dryden_spectra(omega: NDArray[np.float64], deviation: Triple, length: Triple) -> NDArray[np.float64]:
@@ -161,3 +194,12 @@ def dryden_spectra(omega: NDArray[np.float64], deviation: Triple, length: Triple
         # The specification's are per rad/m: sigma^2 scale / pi times this; per Hz it is 2 pi / V times that.
         rows.append(2.0 * sigma * sigma * scale / SPEED * shape)
     return np.array(rows)
+
+
+def turning_spectra(omega: NDArray[np.float64], deviation: Triple, length: Triple) -> NDArray[np.float64]:
+    """One-sided spectra (3, n) of p_g, q_g, r_g of MIL-F-8785C, 3.7.5, in (rad/s)^2 per Hz, at ``omega`` (rad/s)."""
+    _, right, up = dryden_spectra(omega, deviation, length)
+    W, b = omega / SPEED, AIRFRAME.b
+    wide, long = 1.0 + (4.0 * b * W / math.pi) ** 2, 1.0 + (3.0 * b * W / math.pi) ** 2
+    rolling = deviation[2] ** 2 / length[2] * 0.8 * (math.pi * length[2] / (4.0 * b)) ** (1.0 / 3.0) / wide
+    return np.array([2.0 * math.pi / SPEED * rolling, W * W / wide * up, W * W / long * right])

@@ -47,7 +47,7 @@ def test_spectra_are_those_of_the_specification_here_and_by_tustins_rule_there()
     sizes = low_altitude(10.0, 30.0)
     steps = 60_000
     series = {
-        "ours": our_air(steps, DT, *sizes),
+        "ours": our_air(steps, DT, *sizes).speed,
         "tustin": jsbsim_air(TUSTIN, steps, DT, altitude=30.0, wind=10.0).speed,
     }
     for name, air in series.items():
