@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,7 +211,7 @@ def draw_turbulence(file: Path, steps: int) -> None:
     dt, altitude, wind = 0.01, 50.0, 10.0
     sizes = low_altitude(wind, altitude)
     series = {
-        "ours": referee_air.our_air(steps, dt, *sizes),
+        "ours": referee_air.our_air(steps, dt, *sizes).speed,
         "JSBSim, Tustin": referee_air.jsbsim_air(referee_air.TUSTIN, steps, dt, altitude=altitude, wind=wind).speed,
         "JSBSim, Milspec": referee_air.jsbsim_air(referee_air.MILSPEC, steps, dt, altitude=altitude, wind=wind).speed,
     }
@@ -251,11 +252,53 @@ def draw_turbulence(file: Path, steps: int) -> None:
     write(figure, file)
 
 
+def draw_turning(file: Path, steps: int) -> None:
+    """Draw the spectra of p_g, q_g and r_g beside those of the specification, and print deviations and ratios."""
+    dt, altitude, wind = 0.01, 50.0, 10.0
+    sizes = low_altitude(wind, altitude)
+    theirs = referee_air.jsbsim_air(referee_air.TUSTIN, steps, dt, altitude=altitude, wind=wind)
+    series = {"ours": referee_air.our_air(steps, dt, *sizes), "JSBSim, Tustin": theirs}
+    figure, axes = plt.subplots(1, 3, figsize=(7.2, 2.8), layout="constrained", sharex=True, sharey=True)
+    edges = np.geomspace(0.02, 50.0, 32)
+    rows = []
+    for n, name in enumerate(("p_g", "q_g", "r_g")):
+        for k, (side, air) in enumerate(series.items()):
+            frequency, found = welch(air.turning[:, n], 1.0 / dt, nperseg=16384)
+            exact = referee_air.turning_spectra(2.0 * np.pi * frequency, *sizes)[n]
+            bands = [(frequency >= low) & (frequency < high) for low, high in itertools.pairwise(edges)]
+            bands = [band for band in bands if band.any()]
+            middle = [frequency[band].mean() for band in bands]
+            density = [float(found[band].mean()) for band in bands]
+            axes[n].loglog(middle, density, f"C{k}", marker=".", ms=3, lw=0.0, label=side)
+            ratio = [float((found[band] / exact[band]).mean()) for band in bands]
+            below = [one for at, one in zip(middle, ratio, strict=True) if at < 10.0]
+            # Air that turns as a body turns nose up where it rises faster ahead, and nose right where it goes right.
+            gust = {"q_g": air.speed[:, 2], "r_g": air.speed[:, 1]}.get(name)
+            with_gust = "" if gust is None else f"{np.corrcoef(np.diff(gust), air.turning[1:, n])[0, 1]:+.2f}"
+            deviation = np.degrees(air.turning[:, n].std())
+            rows.append([name, side, f"{deviation:.2f}", f"{min(below):.2f}", f"{max(below):.2f}", with_gust])
+        axes[n].loglog(middle, np.interp(middle, frequency, exact), color=INK, lw=0.9, label="MIL-F-8785C", zorder=0)
+        axes[n].set(title=name, xlabel="Hz")
+    axes[0].set(ylabel="(rad/s)^2 per Hz", ylim=(1e-7, None))
+    axes[0].legend(fontsize=6.5)
+    heads = ("rate", "filter", "found, deg/s", "least ratio below 10 Hz", "largest", "correlation with its gust's rate")
+    table(heads, rows)
+    write(figure, file)
+
+
 def rates_in_turbulence(flights: int) -> None:
     """Print root mean squares of body rates in turbulence, with controls fixed, of both."""
     place = {"altitude": 50.0, "wind": 10.0}
     kinds = {"JSBSim, Tustin": referee_air.TUSTIN, "JSBSim, Milspec": referee_air.MILSPEC}
-    found = {"ours": [referee_air.our_rates(seed, 10.0, **place) for seed in range(1, flights + 1)]}
+    ours: dict[str, dict[str, Any]] = {
+        "ours, before: `turning` off": {},
+        "ours, mended: `turning` on": {"turning": referee_air.our_turning},
+        "ours, with JSBSim's p_g and its sign of q_g": {"turning": referee_air.jsbsims_turning, "reversed_pitch": True},
+    }
+    found = {
+        name: [referee_air.our_rates(seed, 10.0, **place, **how) for seed in range(1, flights + 1)]
+        for name, how in ours.items()
+    }
     for name, kind in kinds.items():
         found[name] = [referee_air.rates_of_jsbsim(kind, seed, 10.0, **place) for seed in range(1, flights + 1)]
     with tempfile.TemporaryDirectory() as folder:
@@ -265,7 +308,11 @@ def rates_in_turbulence(flights: int) -> None:
             for seed in range(1, flights + 1)
         ]
     turning = referee_air.jsbsim_air(referee_air.TUSTIN, 100_000, 0.01, **place).turning.std(axis=0)
-    rows = [["p, q, r of JSBSim's air", *(f"{one:.2f}" for one in np.degrees(turning))]]
+    mine = referee_air.our_air(100_000, 0.01, *low_altitude(place["wind"], place["altitude"])).turning.std(axis=0)
+    rows = [
+        [name, *(f"{one:.2f}" for one in np.degrees(air))]
+        for name, air in (("p_g, q_g, r_g, ours", mine), ("p_g, q_g, r_g, JSBSim", turning))
+    ]
     for name, flown in found.items():
         squares = np.array([(one[200:] ** 2).mean(axis=0) for one in flown])
         middle, spread = np.sqrt(squares.mean(axis=0)), np.sqrt(squares).std(axis=0) / math.sqrt(flights)
@@ -295,6 +342,7 @@ def main() -> None:
         draw_flight(given.out / "jsbsim_flight.svg")
         draw_steps(given.out / "jsbsim_steps.svg")
         rates_in_turbulence(40)
+        draw_turning(given.out / "jsbsim_turning.svg", given.steps)
         draw_turbulence(given.out / "jsbsim_turbulence.svg", given.steps)
 
 

@@ -128,7 +128,7 @@ def _exact_step(a: float, k: float, h: float) -> tuple[NDArray[np.float64], NDAr
 
 
 def begin(turbulence: Turbulence, uav: int, gusts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """States m (3,) of p_g, q_g and r_g at the start, drawn from their stationary distribution; zeros if the air stands.
+    """States m (3,) of p_g, q_g and r_g at the start, drawn from their stationary distribution; zeros if it stands.
 
     Parameters
     ----------

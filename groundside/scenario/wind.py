@@ -13,7 +13,16 @@ from ftcc.sim.plants import name_of
 from ftcc.sim.turning_air import NOT_TURNING, ROTATION, TurningAir
 from ftcc.sim.wind import AIR, NO_TURBULENCE, DiscreteGust, Turbulence
 
-__all__ = ["check_wind", "discrete_gusts", "gust", "low_altitude", "mean_wind", "turbulence", "turning_air", "wind_texts"]
+__all__ = [
+    "check_wind",
+    "discrete_gusts",
+    "gust",
+    "low_altitude",
+    "mean_wind",
+    "turbulence",
+    "turning_air",
+    "wind_texts",
+]
 
 _FOOT = 0.3048
 

@@ -60,7 +60,9 @@ class TurbulenceFields(Strict):
     altitude: float | None = Field(
         None, ge=3.048, le=304.8, description="m above the ground, 10 to 1000 ft; the same for the whole flight"
     )
-    turning: bool = Field(False, description="whether the air turns, too: p_g, q_g, r_g (3.7.5), by the airframe's span")
+    turning: bool = Field(
+        False, description="whether the air turns, too: p_g, q_g, r_g (3.7.5), by the airframe's span"
+    )
     airspeed: float | None = Field(None, gt=0.0, description="m/s, airspeed through it; default: the initial V")
     uavs: list[Id] | None = Field(None, min_length=1, description="default: all followers")
 
