@@ -60,7 +60,8 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
     command = np.array([spec.command for spec in specs], np.float64)
     limits = np.array([spec.limits for spec in specs], np.float64)
     state = np.array([spec.initial for spec in specs], np.float64)
-    gusts = [settled(spec.turbulence, spec.uav) for spec in specs]
+    airs = [spec.turbulence for spec in specs]
+    gusts = [settled(air, spec.uav) for spec, air in zip(specs, airs, strict=True)]
     driven = np.array([_driven_at_start(spec, plant) for spec in specs])
     fleet = Fleet(
         state=state,
@@ -79,11 +80,16 @@ def build_fleet(specs: Sequence[VehicleSpec]) -> Fleet:
         gust_period_us=np.array([spec.gust.period_us for spec in specs], np.int64),
         gust_seed=np.array([spec.gust.seed for spec in specs], np.int64),
         gusts=_padded([spec.discrete_gusts for spec in specs], len(DiscreteGust._fields)),
-        dryden=np.array([dryden(spec.turbulence) for spec in specs]),
+        dryden=np.array([dryden(air) for air in airs]),
         turbulence=np.array(gusts),
-        turns=np.array([int(turns(spec.turbulence)) for spec in specs], np.int64),
-        turning=np.array([filters(spec.turbulence) for spec in specs]),
-        turned=np.array([begin(spec.turbulence, spec.uav, states) for spec, states in zip(specs, gusts, strict=True)]),
+        turns=np.array([int(turns(air.turning)) for air in airs], np.int64),
+        turning=np.array([filters(air.turning, air.deviation, air.bandwidth, air.step_us) for air in airs]),
+        turned=np.array(
+            [
+                begin(air.turning, air.bandwidth, air.seed, spec.uav, states)
+                for spec, air, states in zip(specs, airs, gusts, strict=True)
+            ]
+        ),
         still=np.array([int(not spec.discrete_gusts and spec.turbulence == NO_TURBULENCE) for spec in specs], np.int64),
         turbulence_seed=np.array([spec.turbulence.seed for spec in specs], np.int64),
         fault_before_lag=np.array([float(spec.fault_before_lag) for spec in specs]),

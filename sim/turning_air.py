@@ -8,7 +8,7 @@ are frozen and steady, as in `ftcc.sim.wind`: a gradient along the track is a ra
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,6 @@ from ftcc.link.compiled import compiled, fields
 from ftcc.link.philox import TURBULENCE, gaussian_pair, philox
 from ftcc.link.rotation import body_axes
 
-if TYPE_CHECKING:
-    from ftcc.sim.wind import Turbulence
-
 __all__ = ["NOT_TURNING", "ROTATION", "TurningAir", "about_body_axes", "begin", "filters", "rotation", "turn", "turns"]
 
 ROTATION = ("p_g", "q_g", "r_g")
@@ -27,7 +24,7 @@ ROTATION = ("p_g", "q_g", "r_g")
 
 
 class TurningAir(NamedTuple):
-    """How the air of a `Turbulence` turns."""
+    """How the air of a ``wind.Turbulence`` turns."""
 
     deviation: float = 0.0
     """sigma of p_g, rad/s."""
@@ -55,18 +52,20 @@ class TurnFilter(NamedTuple):
     own: float
 
 
+Triple = tuple[float, float, float]
+
 _Z, _R = math.sqrt(1.5), (1.0 - math.sqrt(3.0)) / math.sqrt(2.0)
 """A component across is sigma (_Z z + _R r), see ``wind.dryden``."""
 _TERMS = 20
 """Of exponential series up to 1/2."""
 
 
-def turns(turbulence: Turbulence) -> bool:
-    """Whether its air turns."""
-    return turbulence.turning.airspeed < math.inf
+def turns(air: TurningAir) -> bool:
+    """Whether it turns at all."""
+    return air.airspeed < math.inf
 
 
-def filters(turbulence: Turbulence) -> NDArray[np.float64]:
+def filters(air: TurningAir, deviation: Triple, bandwidth: Triple, step_us: int) -> NDArray[np.float64]:
     """The exact discrete form of the filters, (3, 7): a `TurnFilter` each of p_g, q_g and r_g; zeros if it stands.
 
     MIL-F-8785C, 3.7.5, with V the airspeed and b the span: rolling gusts are noise by itself,
@@ -78,29 +77,35 @@ def filters(turbulence: Turbulence) -> NDArray[np.float64]:
     With k the bandwidth (pi V/(4 b), for r_g pi V/(3 b)), p_g = gain m with m' = -k m + sqrt(2 k) n; the others are
     gain (x - m) with x the gust over its sigma, m' = k (x - m) and gain = sigma k/V. In a step, m gets noise that is
     correlated with that of the gust.
+
+    Parameters
+    ----------
+    air : TurningAir
+    deviation, bandwidth, step_us
+        Of the gusts, see ``wind.Turbulence``.
     """
-    turning, h = turbulence.turning, turbulence.step_us / 1e6
+    h = step_us / 1e6
     rows = np.zeros((len(ROTATION), len(TurnFilter._fields)))
-    if not turns(turbulence):
+    if not turns(air):
         return rows
     rows[0] = TurnFilter(
-        turning.deviation,
-        math.exp(-turning.bandwidth[0] * h),
+        air.deviation,
+        math.exp(-air.bandwidth[0] * h),
         0.0,
         0.0,
         0.0,
         0.0,
-        math.sqrt(-math.expm1(-2.0 * turning.bandwidth[0] * h)),
+        math.sqrt(-math.expm1(-2.0 * air.bandwidth[0] * h)),
     )
     for n, component in ((1, 2), (2, 1)):
-        a, k = turbulence.bandwidth[component], turning.bandwidth[n]
+        a, k = bandwidth[component], air.bandwidth[n]
         phi, noise = _exact_step(a, k, h)
         l11 = math.sqrt(noise[0, 0])
         l21, l31 = noise[1, 0] / l11, noise[2, 0] / l11
         l22 = math.sqrt(max(noise[1, 1] - l21 * l21, 0.0))
         l32 = (noise[2, 1] - l31 * l21) / l22 if l22 > 0.0 else 0.0
         l33 = math.sqrt(max(noise[2, 2] - l31 * l31 - l32 * l32, 0.0))
-        gain = turbulence.deviation[component] * k / turning.airspeed
+        gain = deviation[component] * k / air.airspeed
         rows[n] = TurnFilter(gain, phi[2, 2], phi[2, 0], phi[2, 1], l31, l32, l33)
     return rows
 
@@ -116,7 +121,7 @@ def _exact_step(a: float, k: float, h: float) -> tuple[NDArray[np.float64], NDAr
     terms = [np.eye(3)]
     for n in range(1, _TERMS):
         terms.append(system @ terms[-1] * (short / n))
-    phi = sum(terms[::-1])
+    phi = np.sum(terms[::-1], axis=0)
     noise = np.zeros((3, 3))
     for i, one in enumerate(terms):
         for j, other in enumerate(terms):
@@ -127,22 +132,24 @@ def _exact_step(a: float, k: float, h: float) -> tuple[NDArray[np.float64], NDAr
     return phi, noise
 
 
-def begin(turbulence: Turbulence, uav: int, gusts: NDArray[np.float64]) -> NDArray[np.float64]:
+def begin(air: TurningAir, bandwidth: Triple, seed: int, uav: int, gusts: NDArray[np.float64]) -> NDArray[np.float64]:
     """States m (3,) of p_g, q_g and r_g at the start, drawn from their stationary distribution; zeros if it stands.
 
     Parameters
     ----------
-    turbulence : Turbulence
+    air : TurningAir
+    bandwidth, seed
+        Of the gusts, see ``wind.Turbulence``.
     uav : int
     gusts : array
         (3, 2): the states of the gusts, see ``wind.settled``.
     """
-    if not turns(turbulence):
+    if not turns(air):
         return np.zeros(len(ROTATION))
-    own = _normal(turbulence.seed, 0, uav)
+    own = _normal(seed, 0, uav)
     found = np.array([own[0], 0.0, 0.0])
     for n, component in ((1, 2), (2, 1)):
-        a, k = turbulence.bandwidth[component], turbulence.turning.bandwidth[n]
+        a, k = bandwidth[component], air.bandwidth[n]
         # Stationary covariances of m with z and r, whose own are var z = 1, var r = cov(z, r) = 1/2; its variance.
         with_z = k * (_Z + 0.5 * _R) / (a + k)
         with_r = (a * with_z + 0.5 * k * (_Z + _R)) / (a + k)

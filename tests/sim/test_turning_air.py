@@ -28,6 +28,11 @@ TURNING = STILL_AHEAD._replace(turning=turning_air(SIGMA[2], LENGTH[2], SPAN, V)
 ACROSS = np.array([math.sqrt(3.0), 1.0 - math.sqrt(3.0)]) / math.sqrt(2.0)
 
 
+def rows_of(turbulence: Turbulence) -> np.ndarray:
+    """The filters of its rotation, a `TurnFilter` each."""
+    return filters(turbulence.turning, turbulence.deviation, turbulence.bandwidth, turbulence.step_us)
+
+
 def spectrum(component: int, W: float) -> float:
     """MIL-F-8785C, 3.7.5 and 3.7.1.2, one-sided over the spatial frequency (rad/m), as printed."""
     if component == 0:
@@ -49,7 +54,7 @@ def correlation(component: int, distance: float) -> float:
 def system(component: int, step_us: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Transition and noise covariance of z, r and m over a step, and the row that gives the rate of them."""
     turbulence = TURNING._replace(step_us=step_us)
-    own = TurnFilter(*filters(turbulence)[component])
+    own = TurnFilter(*rows_of(turbulence)[component])
     _, decay, feed, l11, l21, l22 = dryden(turbulence)[3 - component]
     phi = np.array([[decay, 0.0, 0.0], [feed, decay, 0.0], [own.z, own.r, own.decay]])
     root = np.array([[l11, 0.0, 0.0], [l21, l22, 0.0], [own.first, own.second, own.own]])
@@ -76,7 +81,7 @@ def test_sampled_rates_of_the_gusts_have_exactly_the_specifications_correlation(
 
 def test_rolling_gusts_have_exactly_the_specifications_correlation() -> None:
     for step_us in (1000, 400_000):
-        own = TurnFilter(*filters(TURNING._replace(step_us=step_us))[0])
+        own = TurnFilter(*rows_of(TURNING._replace(step_us=step_us))[0])
         assert own.decay**2 + own.own**2 == pytest.approx(1.0, rel=1e-12)
         for steps in (0, 1, 4):
             exact = correlation(0, steps * step_us / 1e6 * V)
@@ -103,7 +108,7 @@ def test_two_steps_are_one_of_twice_the_length(component: int) -> None:
     near = TURNING._replace(
         turning=TURNING.turning._replace(bandwidth=tuple(1.000001 * b for b in same.bandwidth[::-1]))
     )
-    assert filters(same)[component] == pytest.approx(filters(near)[component], rel=1e-5)
+    assert rows_of(same)[component] == pytest.approx(rows_of(near)[component], rel=1e-5)
 
 
 @compiled
