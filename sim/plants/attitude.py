@@ -128,7 +128,7 @@ def rates(s, u, d, a):
     if still:
         V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot = attitude_rates(
             s.V, s.gamma, s.mu, s.alpha, s.beta, s.p, s.q, s.r,
-            u.aileron, u.elevator, u.rudder, u.thrust, d.d1, d.d2, d.d3, a,
+            u.aileron, u.elevator, u.rudder, u.thrust, d.d1, d.d2, d.d3, a, 0.0, 0.0, 0.0,
         )  # fmt: skip
     else:
         V_dot, chi_dot, gamma_dot, mu_dot, alpha_dot, beta_dot, p_dot, q_dot, r_dot = _rates_in_wind(s, u, d, a)

@@ -105,7 +105,7 @@ def _rates_in_wind(s, u, d, a):
 def rates(s, u, d, a):
     """Rates of `State` under the deflections ``u`` and disturbances ``d`` of the airframe ``a``."""
     if d.wind == 0.0 and d.gust == 0.0 and d.wind_along == 0.0 and d.wind_up == 0.0:
-        return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a)
+        return longitudinal_rates(s.V, s.gamma, s.theta, s.q, u.thrust, u.elevator, d.d1, d.d2, d.d3, a, 0.0)
     return _rates_in_wind(s, u, d, a)
 
 
