@@ -86,7 +86,7 @@ def test_malformed_toml_is_reported_with_its_line(tmp_path: Path) -> None:
         ({"settings": ["faults.0.uav=7"]}, ["faults.0.uav = 7", "followers are 1, 2, 3"]),
         ({"settings": ["plant.limits.aileron=[-0.5, 0.5]"]}, ["has no aileron", "thrust, elevator"]),
         ({"settings": ["plant.rate_limits.rudder=1.0"]}, ["has no rudder", "thrust, elevator"]),
-        ({"settings": ["plant.model='glider'"]}, ["plant.model = 'glider'", "attitude, longitudinal"]),
+        ({"settings": ["plant.model='glider'"]}, ["plant.model = 'glider'", "attitude, jsbsim, longitudinal"]),
         ({"settings": ["plant.coefficients={CLx=1.2}"]}, ["plant.coefficients: CLx", "CLa", "and all"]),
         ({"settings": ["start.mu=0.1"]}, ["start.mu: the plant has no such state", "theta"]),
         (
