@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import select
 import time
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ftcc.link.actuators import THRUST
 from ftcc.sim.doors.vehicle import LAUNCH_US, DoorVehicle
 
-__all__ = ["LAUNCH_THROTTLE", "Door", "DoorFlight"]
+__all__ = ["LAUNCH_THROTTLE", "Companion", "Door", "DoorFlight"]
 
 LAUNCH_THROTTLE = 0.5
 """The launch begins above this throttle, 0..1."""
@@ -51,6 +51,15 @@ class Door(Protocol):
     def close(self) -> None: ...
 
 
+class Companion(Protocol):
+    """What commands an autopilot over another link, beside its door."""
+
+    @property
+    def sockets(self) -> tuple[Any, ...]: ...
+    def serve(self) -> None: ...
+    def close(self) -> None: ...
+
+
 class DoorFlight:
     """Aircraft behind doors.
 
@@ -61,6 +70,7 @@ class DoorFlight:
     duration_us : of the scenario, us, from the end of the launch on.
     report : called with what the user should know.
     stopping : asked often; true ends the flight.
+    companions : by UAV; served after each step and when something has come, closed when the UAV is lost.
     """
 
     def __init__(
@@ -70,9 +80,11 @@ class DoorFlight:
         duration_us: int,
         report: Report,
         stopping: Callable[[], bool],
+        companions: Mapping[int, Companion] | None = None,
     ) -> None:
         self.doors, self.speed, self.duration_us = list(doors), speed, duration_us
         self._report, self._stopping = report, stopping
+        self._companions = dict(companions or {})
         self.lost: dict[int, str] = {}
         """UAVs that were lost, with the reason."""
         self._ready: set[int] = set()
@@ -109,6 +121,8 @@ class DoorFlight:
                     self._lose(door, door.vehicle.lost)
             if any(door.vehicle.flown_us >= self.duration_us for door in self.alive):
                 return
+            for companion in self._companions.values():
+                companion.serve()
             self._pace()
 
     def _wait(self, done: Callable[[Door], bool], what: str) -> bool:
@@ -118,9 +132,7 @@ class DoorFlight:
             missing = [door for door in self.alive if not done(door)]
             if not missing:
                 return True
-            readable, _, _ = select.select(missing, [], [], _LOOK)
-            for door in readable:
-                door.read()
+            self._listen(missing, _LOOK)
             self._lose_the_gone()
             if time.monotonic() > remind:
                 remind = time.monotonic() + _REPEAT
@@ -128,6 +140,17 @@ class DoorFlight:
                     if not done(door) and not door.gone:
                         self._report(f"still waits for {door.autopilot} {what}", door.vehicle.uav)
         return False
+
+    def _listen(self, doors: Sequence[Door], seconds: float) -> None:
+        """Wait for doors and companions, and take in what has come."""
+        beside = [one for companion in self._companions.values() for one in companion.sockets]
+        readable, _, _ = select.select([*doors, *beside], [], [], seconds)
+        for door in doors:
+            if door in readable:
+                door.read()
+        if any(one in readable for one in beside):
+            for companion in self._companions.values():
+                companion.serve()
 
     def _lose_the_gone(self) -> None:
         for door in self.alive:
@@ -137,6 +160,9 @@ class DoorFlight:
     def _lose(self, door: Door, why: str) -> None:
         self.lost[door.vehicle.uav] = why
         door.close()
+        companion = self._companions.pop(door.vehicle.uav, None)
+        if companion is not None:
+            companion.close()
         self._report(f"lost: {why}", door.vehicle.uav)
 
     def _prepare_launch(self) -> None:
@@ -164,9 +190,7 @@ class DoorFlight:
         now = time.monotonic()
         self._due = now if math.isinf(speed) else max(self._due + period / speed, now - _BEHIND)
         while free or self._due > now:
-            readable, _, _ = select.select(self.alive, [], [], max(0.0, self._due - now))
-            for door in readable:
-                door.read()
+            self._listen(self.alive, max(0.0, self._due - now))
             self._lose_the_gone()
             now = time.monotonic()
             if now >= self._due:

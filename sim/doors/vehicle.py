@@ -115,6 +115,12 @@ class DoorVehicle:
             self.step_us = self._wanted_step
             self.period_us = max(1, round(wanted_us / self.step_us)) * self.step_us
         self._record_every = max(1, round(self._record_us / self.period_us))
+        modelled = self.spec.flown
+        if modelled is not None and modelled.step_us != self.step_us:
+            # An outside model goes by its own step, whatever it is asked for.
+            self.spec = replace(self.spec, flown=replace(modelled, step_us=self.step_us))
+            self.fleet = build_fleet([self.spec])
+            self._cycle.actuate(self.fleet, 0, _BEFORE_FLIGHT)
 
     @property
     def flying(self) -> bool:
