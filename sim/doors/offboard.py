@@ -131,6 +131,9 @@ class Offboard:
             raise PortError(f"port {px4_port} or {port}: {error.strerror or error}") from None
         self._px4.setblocking(False)
         self._wire = new_wire([vehicle.uav], SIMULATOR)
+        # Compiled here: PX4 does not wait for it in flight.
+        read_attitude_target(self._wire, self._target)
+        send_state(self._wire, 0, 0, np.full(len(StateMessage._fields), math.nan), np.zeros(4), False)
         connect(self._wire, [self._law], -1)
 
     @property

@@ -135,7 +135,7 @@ class OffboardPlayer(Player):
             return
         roll, pitch = angles(self.truth.attitude_quaternion)
         wanted_roll, wanted_pitch = angles(self.target.q)
-        aileron = 0.4 * (wanted_roll - roll) - 0.1 * self.truth.rollspeed
+        aileron = 1.2 * (wanted_roll - roll) - 0.2 * self.truth.rollspeed
         elevator = 0.8 * (wanted_pitch - pitch) - 0.2 * self.truth.pitchspeed + 0.1
         controls[2] = -0.1 * self.truth.yawspeed
         controls[4] = max(0.0, min(1.0, self.target.thrust))
