@@ -24,6 +24,8 @@ _PATIENCE, _REPEAT = 2.0, 10.0
 """Wait after which it is reported who is waited for, and again, wall s."""
 _BEHIND = 0.1
 """Lag behind the pace that is caught up, wall s."""
+_ANSWER = 0.02
+"""Longest wait of a step for the answers of companions, wall s."""
 
 Report = Callable[[str, "int | None"], None]
 """Called with a text and the UAV that it is about."""
@@ -56,6 +58,8 @@ class Companion(Protocol):
 
     @property
     def sockets(self) -> tuple[Any, ...]: ...
+    @property
+    def waiting(self) -> bool: ...
     def serve(self) -> None: ...
     def close(self) -> None: ...
 
@@ -121,8 +125,7 @@ class DoorFlight:
                     self._lose(door, door.vehicle.lost)
             if any(door.vehicle.flown_us >= self.duration_us for door in self.alive):
                 return
-            for companion in self._companions.values():
-                companion.serve()
+            self._serve_companions()
             self._pace()
 
     def _wait(self, done: Callable[[Door], bool], what: str) -> bool:
@@ -140,6 +143,17 @@ class DoorFlight:
                     if not done(door) and not door.gone:
                         self._report(f"still waits for {door.autopilot} {what}", door.vehicle.uav)
         return False
+
+    def _serve_companions(self) -> None:
+        """Let all companions do what is due; time waits for their answers, though not for long."""
+        for companion in self._companions.values():
+            companion.serve()
+        until = time.monotonic() + _ANSWER
+        while any(companion.waiting for companion in self._companions.values()):
+            left = until - time.monotonic()
+            if left <= 0.0 or self._stopping():
+                return
+            self._listen((), left)
 
     def _listen(self, doors: Sequence[Door], seconds: float) -> None:
         """Wait for doors and companions, and take in what has come."""

@@ -21,7 +21,7 @@ from ftcc.link.codec import Codec, dialect
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, Endpoint, ending_message
 from ftcc.link.messages import AttitudeTarget, StateMessage
 from ftcc.link.ports import PortError
-from ftcc.link.timing import Timing
+from ftcc.link.timing import Timing, tick_of
 from ftcc.link.wire import connect, new_wire, read_attitude_target, receive_datagram, send_state
 from ftcc.sim.doors.vehicle import DoorVehicle
 
@@ -117,8 +117,8 @@ class Offboard:
         self._tick = -1
         """Of the last state that went to the law."""
         self._target_us = 0
-        """When the law's last target came, simulated us."""
-        self._silent = self._left = False
+        """When the law's last target came, or its first state went out, simulated us."""
+        self._silent = self._left = self._unanswered = False
         self._refused: set[tuple[int, int]] = set()
         self._state: NDArray[np.float64] = np.zeros(len(StateMessage._fields))
         self._target: NDArray[np.float64] = np.zeros(len(AttitudeTarget._fields))
@@ -146,6 +146,11 @@ class Offboard:
         """Whether PX4 is in OFFBOARD."""
         return self.mode is not None and self.mode >> 16 & 0xFF == _OFFBOARD
 
+    @property
+    def waiting(self) -> bool:
+        """Whether the law has not answered the last state yet; false once it is silent."""
+        return self._unanswered and not self._silent
+
     def serve(self) -> None:
         """Take in what has come from both sides, and send what is due."""
         self._read_px4()
@@ -167,9 +172,12 @@ class Offboard:
             self._send_target(self._at_launch())
             if self._streaming_since is None:
                 self._streaming_since = now
-        if self.targets and now - self._target_us > _SILENCE_US and not self._silent:
+        if self.states and now - self._target_us > _SILENCE_US and not self._silent:
             self._silent = True
-            self._report(f"no target of the law for {_SILENCE_US / 1e6:g} s: PX4 will leave OFFBOARD")
+            self._report(
+                f"no target of the law for {_SILENCE_US / 1e6:g} s"
+                + (": PX4 will leave OFFBOARD" if self.targets else "")
+            )
 
     def _begin(self, now: int) -> None:
         """Ask for OFFBOARD and arm, until the launch; afterwards whoever changes that has the aircraft."""
@@ -230,7 +238,9 @@ class Offboard:
         self.mode, self.armed = message.custom_mode, bool(message.base_mode & _ARMED)
         if was and not self.offboard:
             self._left = True
-            self._report(f"PX4 left OFFBOARD for {mode_name(self.mode)}; the law's targets go on, PX4 does not fly them")
+            self._report(
+                f"PX4 left OFFBOARD for {mode_name(self.mode)}; the law's targets go on, PX4 does not fly them"
+            )
         elif self.offboard and not was:
             self._report("PX4 is in OFFBOARD again" if self._left else "PX4 is in OFFBOARD")
 
@@ -288,13 +298,19 @@ class Offboard:
         )  # fmt: skip
         if send_state(self._wire, 0, tick * period, self._state, np.zeros(4), False):
             self._tick = int(tick)
+            if self.states == 0:
+                self._target_us = self.vehicle.now_us
             self.states += 1
+            self._unanswered = True
 
     def _read_law(self, now: int) -> None:
         """Pass the law's targets on; only the newest counts."""
         came = False
         while receive_datagram(self._wire, 0):
-            came = read_attitude_target(self._wire, self._target) >= 0 or came
+            stamp = read_attitude_target(self._wire, self._target)
+            came = came or stamp >= 0
+            if tick_of(stamp, self._timing.period_us) == self._tick:
+                self._unanswered = False
         if not came:
             return
         if self._silent:

@@ -85,7 +85,7 @@ class OffboardPlayer(Player):
             self.intervals[int(message.param1)] = int(message.param2)
         elif message.command == mavlink.MAV_CMD_DO_SET_MODE and int(message.param2) == 6:
             recent = [stamp for stamp in self.heard if self.clock - stamp <= LOSS_US]
-            if not message.param1 == 1 or len(recent) < 2:
+            if message.param1 != 1 or len(recent) < 2:
                 return _TEMPORARILY
             self.mode = OFFBOARD
         elif message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:

@@ -19,11 +19,8 @@ from ftcc.sim.doors.channels import PX4
 from ftcc.sim.doors.flight import DoorFlight
 from ftcc.sim.doors.offboard import Offboard, mode_name
 from ftcc.sim.doors.px4 import Px4Door
-from tests.sim.doors.bench import ROOT, a_vehicle, mission, pytest_fails
+from tests.sim.doors.bench import ROOT, a_vehicle, mission
 from tests.support.ports import free_port
-
-SPEED = 8.0
-"""Simulated seconds per second: the offboard link is not in lockstep, a law must have time to answer."""
 
 
 def bank_of(t: float) -> float:
@@ -103,7 +100,7 @@ class Flown:
             player = subprocess.Popen([*command, str(leave_at)], cwd=ROOT)
             try:
                 self.flight = DoorFlight(
-                    [door], SPEED, round(seconds * 1e6), lambda text, _: self.said.append(text),
+                    [door], math.inf, round(seconds * 1e6), lambda text, _: self.said.append(text),
                     lambda: player.poll() is not None, {1: bridge},
                 )  # fmt: skip
                 self.flight.fly()

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from ftcc.groundside.scenario import load, resolve
+from ftcc.link.home import Home
 from ftcc.link.ports import PortError
 from ftcc.sim.doors import flight
 from ftcc.sim.doors.channels import PX4, ChannelError, Channels, by_pwm, checked, fractions
 from ftcc.sim.doors.flight import DoorFlight
 from ftcc.sim.doors.px4 import Px4Door
-from tests.sim.doors.bench import Flown, a_vehicle, by_px4, fly, player, pytest_fails
+from ftcc.sim.doors.vehicle import DoorVehicle
+from tests.sim.doors.bench import EXACT, Flown, a_vehicle, by_px4, fly, player, pytest_fails
 from tests.support.ports import free_port
 
 
@@ -309,3 +312,20 @@ def test_one_that_stands_still_does_not_hold_the_door():
         while not door.answered:
             client.recv(1 << 16)
         assert door.gone == ""
+
+
+def test_an_aircraft_of_jsbsim_flies_in_real_time_at_the_step_of_its_door():
+    """Its scenario steps it by 5 ms, PX4 by 4 ms: in 2 s it flies as far as its speed says."""
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    flown = resolve(load("jsbsim_attitude"))
+    vehicle = DoorVehicle(flown.vehicles[0], flown.timing, Home(*flown.home), EXACT, None, pytest_fails)
+    door = Px4Door(vehicle, free_port(), PX4, pytest_fails)
+    said: list[tuple[str, int | None]] = []
+    with player("px4_player", "--port", str(door.port)):
+        truth = fly([door], 2.0, said).truth[1]
+    assert len(truth) == 501
+    assert vehicle.spec.flown is not None
+    assert vehicle.spec.flown.step_us == 1000
+    along = np.linalg.norm(np.diff(truth[:, :3], axis=0), axis=1).sum()
+    assert along == pytest.approx(truth[:, 3].mean() * 2.0, rel=0.01)
+    assert along > 80.0
