@@ -68,6 +68,11 @@ def mode_name(custom_mode: int) -> str:
     return f"{name} {_AUTO.get(sub, sub)}" if main == 4 else name
 
 
+def _name(group: str, number: int) -> str:
+    entry = dialect.enums[group].get(number)
+    return str(number) if entry is None else entry.name.removeprefix(f"{group}_")
+
+
 class Offboard:
     """The bridge of one aircraft.
 
@@ -228,12 +233,11 @@ class Offboard:
             refusal = (message.command, message.result)
             if refusal not in self._refused:
                 self._refused.add(refusal)
-                command = dialect.enums["MAV_CMD"][message.command].name.removeprefix("MAV_CMD_")
-                result = dialect.enums["MAV_RESULT"][message.result].name.removeprefix("MAV_RESULT_")
-                self._report(f"PX4 refuses {command}: {result}")
+                command = _name("MAV_CMD", message.command)
+                self._report(f"PX4 refuses {command}: {_name('MAV_RESULT', message.result)}")
 
     def _take_mode(self, message: Any) -> None:
-        """Report by name when PX4 leaves OFFBOARD, and comes back: it is not asked back, a pilot may have taken over."""
+        """Report by name when PX4 leaves OFFBOARD and comes back. It is not asked to: a pilot may have taken over."""
         was = self.offboard
         self.mode, self.armed = message.custom_mode, bool(message.base_mode & _ARMED)
         if was and not self.offboard:

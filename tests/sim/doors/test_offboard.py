@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 import select
+import socket
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import closing
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint
 from ftcc.link.messages import StateMessage
+from ftcc.link.ports import PortError
 from ftcc.link.wire import connect, new_wire, read_state, receive_datagram, send_attitude_target
 from ftcc.sim.doors.channels import PX4
 from ftcc.sim.doors.flight import DoorFlight
@@ -185,3 +189,19 @@ def test_modes_are_named():
     assert [mode_name(mode) for mode in (6 << 16, 4 << 16 | 5 << 24, 1 << 16, 77 << 16)] == [
         "OFFBOARD", "AUTO RTL", "MANUAL", "mode 77",
     ]  # fmt: skip
+
+
+def test_what_px4_refuses_is_reported_once_by_name():
+    said: list[str] = []
+    ports = [free_port() for _ in range(3)]
+    bridge = Offboard(a_vehicle(), mission().timing, 0.0, *ports, said.append)
+    mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    other = mavlink.MAVLink(None, srcSystem=2, srcComponent=1)
+    denied = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 2)
+    with closing(bridge), closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as px4:
+        for sender in (other, mav, mav):
+            px4.sendto(denied.pack(sender), (LOOPBACK, ports[0]))
+        bridge.serve()
+        assert said == ["PX4 refuses COMPONENT_ARM_DISARM: DENIED"]
+        with pytest.raises(PortError, match=str(ports[0])):
+            Offboard(a_vehicle(), mission().timing, 0.0, *ports, said.append)
