@@ -209,7 +209,7 @@ class DoorVehicle:
         """Speed through the air, m/s; on the launcher the air is at rest."""
         if not self.flying:
             return true[V]
-        air = dict(zip((name for name, _ in self._plant.DISTURBANCES), self.fleet.disturbed[0].tolist(), strict=True))
+        air = dict(zip(self._plant.Disturbances._fields, self.fleet.disturbed[0].tolist(), strict=True))
         along, right = air.get("wind_along", 0.0), air.get("wind_right", 0.0)
         cos_chi, sin_chi = math.cos(true[CHI]), math.sin(true[CHI])
         north = wind_speed(true[Z], air.get("wind", 0.0), air.get("gust", 0.0)) + along * cos_chi - right * sin_chi
