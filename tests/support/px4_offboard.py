@@ -1,8 +1,9 @@
 """The offboard side of the player of PX4: modes, arming, message rates, targets and what happens without them.
 
 After PX4's public sources, of which px4_custom_mode.h alone was compared line by line: px4-rc.mavlink (port 14580 + n
-towards 14540 + n), mavlink_receiver.cpp (SET_ATTITUDE_TARGET, COMMAND_LONG), and the page "Offboard Mode" of its guide:
-OFFBOARD needs a stream above 2 Hz before it is entered, and is left COM_OF_LOSS_T after the last target, on PX4's clock.
+towards 14540 + n), mavlink_receiver.cpp (SET_ATTITUDE_TARGET, COMMAND_LONG), and the page "Offboard Mode" of its
+guide: OFFBOARD needs a stream above 2 Hz before it is entered, and is left COM_OF_LOSS_T after the last target, on
+PX4's clock.
 """
 
 from __future__ import annotations
