@@ -11,22 +11,18 @@ from ftcc.link.actuators import ACTUATORS, unit_of
 from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError
 from ftcc.sim.jsbsim.controls import NO_CONTROL, Controls, controls_of
 from ftcc.sim.jsbsim.flight import FlownAircraft
+from ftcc.sim.plants import flies_model
 
-__all__ = ["aircraft_of", "flown_of", "is_modelled", "lacking_actuators"]
+__all__ = ["aircraft_of", "flown_of", "lacking_actuators"]
 
 _SLACK = 1e-6
 """By how much a limit may exceed the travel that was measured, of the travel."""
 
 
-def is_modelled(plant: ModuleType) -> bool:
-    """Return whether JSBSim flies the plant."""
-    return hasattr(plant, "driven")
-
-
 def aircraft_of(plan: Plan, plant: ModuleType, file: Path, findings: Findings) -> Aircraft | None:
     """Return the aircraft of JSBSim that a scenario names; None if it names none. Refuse one that cannot be loaded."""
     given = plan.plant
-    if not is_modelled(plant):
+    if not flies_model(plant):
         for name in ("aircraft", "properties"):
             if getattr(given, name):
                 findings.refuse(f'plant.{name}: is for plant.model = "jsbsim" alone')

@@ -9,7 +9,7 @@ from ftcc.groundside.scenario.checks import Findings
 from ftcc.groundside.schema import Plan, TurbulenceFields
 from ftcc.link.timing import Timing
 from ftcc.sim.disturbances import Disturbance, Gust
-from ftcc.sim.plants import name_of
+from ftcc.sim.plants import flies_model, name_of
 from ftcc.sim.turning_air import NOT_TURNING, ROTATION, TurningAir
 from ftcc.sim.wind import AIR, NO_TURBULENCE, DiscreteGust, Turbulence
 
@@ -35,7 +35,7 @@ def check_wind(plan: Plan, plant: ModuleType, findings: Findings) -> None:
             findings.refuse(f"{table}: the plant flies in still air")
     turning = plan.turbulence is not None and plan.turbulence.turning
     if turning and plant.Disturbances._fields[-len(ROTATION) :] != ROTATION:
-        why = "flies by JSBSim, which takes no rotation" if hasattr(plant, "driven") else "has no body rates"
+        why = "flies by JSBSim, which takes no rotation" if flies_model(plant) else "has no body rates"
         findings.refuse(f"turbulence.turning = true: plant {name_of(plant)} {why}; leave it out")
     named = [(f"gusts.{n}.uavs", gust.uavs) for n, gust in enumerate(plan.gusts)]
     named += [("turbulence.uavs", plan.turbulence.uavs)] if plan.turbulence is not None else []

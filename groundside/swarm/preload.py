@@ -33,6 +33,7 @@ from ftcc.sim import process as vehicle_process
 from ftcc.sim.group import build_group as build_vehicles
 from ftcc.sim.jsbsim.flight import preload as preload_jsbsim
 from ftcc.sim.plants import find as find_plant
+from ftcc.sim.plants import flies_model
 from ftcc.sim.plants import flight_of as flight_of_vehicles
 from ftcc.sim.spec import placeholder as no_vehicle
 
@@ -50,7 +51,7 @@ def load(scheme: str, plant: str, active: bool) -> None:
     # Python calls these when it sends and receives; loaded in each child, they would cost 5 MB.
     begin(autopilots.transmission, 0, 0, 0, 1)
     take_in(autopilots.transmission, autopilots.exchange)
-    if hasattr(find_plant(plant), "driven"):
+    if flies_model(find_plant(plant)):
         preload_jsbsim()
     vehicles = build_vehicles([no_vehicle(plant)], new_rows(1, len(vehicle_process.columns(plant))), 1)
     vehicle_process.load_compiled(vehicles, timing, flight_of_vehicles(plant))

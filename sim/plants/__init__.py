@@ -10,7 +10,7 @@ from types import ModuleType
 from ftcc.link.actuators import SLOT, unit_of
 from ftcc.link.compiled import instantiate
 
-__all__ = ["conditions_of", "cycle_of", "find", "flight_of", "name_of", "names"]
+__all__ = ["conditions_of", "cycle_of", "find", "flies_model", "flight_of", "name_of", "names"]
 
 _REQUIRED = ("State", "Inputs", "Disturbances", "Parameters")
 _LISTS = ("ACTUATORS", "COMPLETED", "DISTURBANCES", "SERVES", "START")
@@ -48,6 +48,11 @@ def find(name: str) -> ModuleType:
     if unknown:
         raise TypeError(f"plant {name}: actuators {', '.join(unknown)} have no slot in ftcc.link.actuators")
     return module
+
+
+def flies_model(plant: ModuleType) -> bool:
+    """Whether an external model flies the plant's vehicles, see ``driven`` in ``sim/README.md``."""
+    return hasattr(plant, "driven")
 
 
 def conditions_of(plant: str) -> tuple[tuple[str, str], ...]:
