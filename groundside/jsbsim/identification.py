@@ -14,11 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.link.airframe import Airframe
-from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, JsbsimError
-from ftcc.sim.jsbsim.bench import POUND, Bench, Commands, Pose
+from ftcc.groundside.jsbsim.terms import SIZES
+from ftcc.link.airframe import Airframe, parameters
+from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError
+from ftcc.sim.jsbsim.bench import Bench, Commands, Pose
 from ftcc.sim.jsbsim.controls import Controls, controls_of
 from ftcc.sim.jsbsim.steady import Steady, steady_flight
+from ftcc.sim.jsbsim.units import FOOT, POUND
 
 __all__ = ["Fit", "Identified", "identify"]
 
@@ -26,20 +28,14 @@ Array = NDArray[np.float64]
 
 SAMPLES = 400
 """States on the bench."""
-_SLUG = 14.59390294
-"""kg."""
 _SPREAD = {"alpha": math.radians(4.0), "beta": math.radians(4.0), "rate": 0.03, "travel": 0.3}
 """Half widths of the states: angles rad; rates in units of 2 V / b and 2 V / c; share of each surface's travel."""
 
 _TERMS = {
-    "CL": ("CL0", "CLa", "CLde"),
-    "CD": ("CD0", "CDa", "CDa2"),
-    "CY": ("CY0", "CYb"),
-    "Cl": ("Cl0", "Clb", "Clda", "Cldr", "Clp", "Clr"),
-    "Cm": ("Cm0", "Cma", "Cmde", "Cmq"),
-    "Cn": ("Cn0", "Cnb", "Cnda", "Cndr", "Cnp", "Cnr"),
+    force: tuple(name for name in parameters(Airframe) if name.startswith(force))
+    for force in ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 }
-"""The coefficients of each force and moment, (2.7)."""
+"""The coefficients of each force and moment, (2.7), by how their names begin."""
 _BESIDE = {
     "CL": ("q", "b2"),
     "CD": ("b2", "|b|", "de", "de2", "da2", "dr2"),
@@ -123,27 +119,11 @@ def _size(bench: Bench) -> dict[str, float]:
             raise JsbsimError(f"{bench.aircraft.name}: has no property {name}")
         return value
 
-    inertia = _SLUG * FOOT**2
-    return {
-        "m": read("inertia/mass-slugs") * _SLUG,
-        "g": read("accelerations/gravity-ft_sec2") * FOOT,
-        "rho": read("atmosphere/rho-slugs_ft3") * _SLUG / FOOT**3,
-        "S": read("metrics/Sw-sqft") * FOOT**2,
-        "c": read("metrics/cbarw-ft") * FOOT,
-        "b": read("metrics/bw-ft") * FOOT,
-        "Ix": read("inertia/ixx-slugs_ft2") * inertia,
-        "Iy": read("inertia/iyy-slugs_ft2") * inertia,
-        "Iz": read("inertia/izz-slugs_ft2") * inertia,
-        "Ixz": _cross_inertia(bench) * inertia,
-    }
-
-
-def _cross_inertia(bench: Bench) -> float:
-    """Return Ixz, slug ft^2, with our sign; that of JSBSim's property depends on the aircraft's file."""
+    sizes = {name: read(place) * unit for name, (place, unit) in SIZES.items()}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PendingDeprecationWarning)  # it is a numpy matrix
         tensor = np.asarray(bench.model.get_mass_balance().get_J())
-    return -float(tensor[0, 2])
+    return sizes | {"Ixz": math.copysign(sizes["Ixz"], -float(tensor[0, 2]))}
 
 
 def _states(size: dict[str, float], controls: Controls, steady: Steady, V: float, seed: int) -> list[dict[str, float]]:

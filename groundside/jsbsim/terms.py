@@ -1,4 +1,4 @@
-"""Which coefficient makes which force or moment, as in (2.6) and (2.7), in the names of JSBSim; and JSBSim's units."""
+"""An airframe in the names of JSBSim: its sizes, and which coefficient makes which force or moment, (2.6) and (2.7)."""
 
 from __future__ import annotations
 
@@ -6,18 +6,26 @@ import math
 from typing import NamedTuple
 
 from ftcc.link.airframe import Airframe, parameters
+from ftcc.sim.jsbsim.units import FOOT, SLUG
 
-__all__ = ["AXES", "FOOT", "POUND", "SLUG", "SLUGS_TO_POUNDS", "Axis", "coefficients"]
+__all__ = ["AXES", "SIZES", "SLUGS_TO_POUNDS", "Axis", "coefficients"]
 
-FOOT = 0.3048
-"""m, exactly."""
-POUND = 0.45359237 * 9.80665
-"""N, exactly."""
-SLUG = POUND / FOOT
-"""kg, exactly."""
 SLUGS_TO_POUNDS = 32.174049
 """By which JSBSim makes the mass of a weight."""
 
+SIZES = {
+    "m": ("inertia/mass-slugs", SLUG),
+    "g": ("accelerations/gravity-ft_sec2", FOOT),
+    "rho": ("atmosphere/rho-slugs_ft3", SLUG / FOOT**3),
+    "S": ("metrics/Sw-sqft", FOOT**2),
+    "c": ("metrics/cbarw-ft", FOOT),
+    "b": ("metrics/bw-ft", FOOT),
+    "Ix": ("inertia/ixx-slugs_ft2", SLUG * FOOT**2),
+    "Iy": ("inertia/iyy-slugs_ft2", SLUG * FOOT**2),
+    "Iz": ("inertia/izz-slugs_ft2", SLUG * FOOT**2),
+    "Ixz": ("inertia/ixz-slugs_ft2", SLUG * FOOT**2),
+}
+"""Where JSBSim tells the sizes of an aircraft, and its unit there; the sign of Ixz depends on the aircraft's file."""
 _ALPHA, _BETA = "aero/alpha-rad", "aero/beta-rad"
 _AILERON, _ELEVATOR, _RUDDER = (f"fcs/{name}-deflection-rad" for name in ("aileron", "elevator", "rudder"))
 _ROLL = ("aero/bi2vel", "velocities/p-aero-rad_sec")

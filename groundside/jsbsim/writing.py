@@ -10,10 +10,11 @@ from typing import Any
 
 from ftcc.groundside.errors import UserError
 from ftcc.groundside.jsbsim.actuators import Actuator, actuators_of
-from ftcc.groundside.jsbsim.terms import AXES, FOOT, POUND, SLUG, SLUGS_TO_POUNDS, coefficients
+from ftcc.groundside.jsbsim.terms import AXES, SLUGS_TO_POUNDS, coefficients
 from ftcc.groundside.schema import AirframeSheet, PointMassSheet, record_of
 from ftcc.link.actuators import ACTUATORS, unit_of
 from ftcc.link.airframe import Airframe, parameters
+from ftcc.sim.jsbsim.units import FOOT, POUND, SLUG
 from ftcc.sim.trim import TrimError, trim
 
 __all__ = ["AircraftError", "can_fly_level", "write_aircraft"]

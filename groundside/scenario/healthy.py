@@ -11,7 +11,7 @@ from ftcc.groundside.scenario.mission import Mission
 from ftcc.groundside.schema import Plan
 from ftcc.link.airframe import Airframe, PointMass
 from ftcc.sim.plant import UNITS
-from ftcc.sim.plants import find
+from ftcc.sim.plants import find, flies_model
 from ftcc.sim.wind import AIR
 
 __all__ = ["HEALTHY", "healthy_changes", "healthy_quantities"]
@@ -67,6 +67,9 @@ def _flies_in_air(mission: Mission) -> bool:
 
 
 def _coefficients(mission: Mission) -> Sequence[str]:
+    """Those of the true aircraft; none where an external model has its own."""
+    if flies_model(find(mission.plant)):
+        return ()
     record = PointMass if find(mission.plant).Parameters is PointMass else Airframe
     return [name for name in record._fields if name.startswith("C")]
 

@@ -13,10 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import jsbsim
 
-__all__ = ["FOOT", "MODEL_STEP", "Aircraft", "JsbsimError", "file_of", "load", "package", "parts_of", "shipped"]
-
-FOOT = 0.3048
-"""m."""
+__all__ = ["MODEL_STEP", "Aircraft", "JsbsimError", "file_of", "load", "package", "parts_of", "shipped"]
 
 MODEL_STEP = 1.0 / 120.0
 """Longest integration step of JSBSim that its aircraft are made for, s."""

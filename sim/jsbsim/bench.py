@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, JsbsimError, load
+from ftcc.sim.jsbsim.aircraft import Aircraft, JsbsimError, load
+from ftcc.sim.jsbsim.units import FOOT, POUND
 
 if TYPE_CHECKING:
     import jsbsim
 
 __all__ = [
-    "POUND",
     "THROTTLE",
     "TURBULENCE",
     "Accelerations",
@@ -27,8 +27,6 @@ __all__ = [
 TURBULENCE = "atmosphere/turb-type"
 THROTTLE = "fcs/throttle-cmd-norm"
 _SURFACES = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm")
-POUND = 4.4482216152605
-"""N."""
 
 
 _SETTLING = 4

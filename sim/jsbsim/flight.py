@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.link.callbacks import NOBODY, register
-from ftcc.sim.jsbsim.aircraft import FOOT, Aircraft, load, package, parts_of
+from ftcc.sim.jsbsim.aircraft import Aircraft, load, package, parts_of
 from ftcc.sim.jsbsim.bench import TURBULENCE, prepare, set_commands, start_engines
 from ftcc.sim.jsbsim.controls import Controls
+from ftcc.sim.jsbsim.units import FOOT
 from ftcc.sim.plant import LOST
 
 if TYPE_CHECKING:
