@@ -115,7 +115,7 @@ def _words(sheet: AirframeSheet, airframe: Airframe, name: str, actuators: Mappi
         "T_max": sheet.T_max,
         "axes": AXES,
         "about": about,
-        "inertia": {key: repr(getattr(airframe, key) / inertia) for key in ("Ix", "Iy", "Iz", "Ixz")},
+        "inertia": {key: repr(getattr(airframe, key) / inertia) for key in about if key.startswith("I")},
         "weight": repr(pounds),
         "area": repr(airframe.S / FOOT**2),
         "span": repr(airframe.b / FOOT),
