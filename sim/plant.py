@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["DIVERGED", "LOST", "TRUTH", "UNITS", "Guards"]
+from ftcc.link.compiled import compiled
+
+__all__ = ["DIVERGED", "LOST", "TRUTH", "UNITS", "Guards", "beyond"]
 
 UNITS = {
     "x": "m", "y": "m", "z": "m", "V": "m/s",
@@ -50,3 +52,17 @@ class Guards(NamedTuple):
     """rad."""
     sideslip: float
     """rad."""
+
+
+@compiled
+def beyond(speed, flight_path_angle, angle_of_attack, sideslip, guards):
+    """Which of the guards an aircraft is beyond, a key of `LOST`; 0: none. Speed in m/s, angles in rad."""
+    if guards.least_airspeed > speed:
+        return AIRSPEED
+    if abs(flight_path_angle) > guards.flight_path_angle:
+        return CLIMB
+    if abs(angle_of_attack) > guards.angle_of_attack:
+        return INCIDENCE
+    if abs(sideslip) > guards.sideslip:
+        return SIDESLIP
+    return 0

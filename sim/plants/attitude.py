@@ -15,16 +15,12 @@ from ftcc.link.compiled import compiled
 from ftcc.link.rotation import body_attitude, wrapped
 from ftcc.sim.airframe import Airframe, Deflections, attitude_rates, turning_rates
 from ftcc.sim.plant import (
-    AIRSPEED,
     ALPHA,
     BETA,
     CHI,
-    CLIMB,
     GAMMA,
-    INCIDENCE,
     MU,
     NUMBER,
-    SIDESLIP,
     THETA,
     P,
     Q,
@@ -33,6 +29,7 @@ from ftcc.sim.plant import (
     X,
     Y,
     Z,
+    beyond,
 )
 from ftcc.sim.plants.longitudinal import DISTURBANCES, Disturbances, level
 from ftcc.sim.turning_air import about_body_axes
@@ -49,7 +46,7 @@ __all__ = [
     "Parameters",
     "State",
     "airspeed",
-    "alpha_of",
+    "alpha_at_start",
     "complete",
     "initial",
     "level",
@@ -179,15 +176,7 @@ def lost(s, guards):
     moving = abs(s.p) + abs(s.q) + abs(s.r) + abs(s.chi) + abs(s.mu)
     if not (s.V + moving + abs(s.gamma) + abs(s.alpha) + abs(s.beta) < math.inf):
         return NUMBER
-    if guards.least_airspeed > s.V:
-        return AIRSPEED
-    if abs(s.gamma) > guards.flight_path_angle:
-        return CLIMB
-    if abs(s.alpha) > guards.angle_of_attack:
-        return INCIDENCE
-    if abs(s.beta) > guards.sideslip:
-        return SIDESLIP
-    return 0
+    return beyond(s.V, s.gamma, s.alpha, s.beta, guards)
 
 
 def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
@@ -199,16 +188,29 @@ def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
         If pitch and angle of attack are both given, or no angle of attack gives that pitch.
     """
     gamma, mu, beta = (start.get(name, 0.0) for name in ("gamma", "mu", "beta"))
-    alpha = start.get("alpha", steady["alpha"])
-    if "theta" in start:
-        if "alpha" in start:
-            raise ValueError("theta and alpha are both given; the one follows from the other")
-        alpha = alpha_of(start["theta"], gamma, mu, beta)
+    alpha = alpha_at_start(start, steady, gamma, mu, beta)
     free = {name: start.get(name, 0.0) for name in State._fields if name not in ("V", "z", "gamma", "alpha")}
     return State(V=start["V"], z=start["z"], gamma=gamma, alpha=alpha, **free)
 
 
-def alpha_of(theta: float, gamma: float, mu: float, beta: float) -> float:
+def alpha_at_start(
+    start: Mapping[str, float], steady: Mapping[str, float], gamma: float, mu: float, beta: float
+) -> float:
+    """Angle of attack at the start: given, from the pitch that is given, or that of steady flight; rad.
+
+    Raises
+    ------
+    ValueError
+        If pitch and angle of attack are both given, or no angle of attack gives that pitch.
+    """
+    if "theta" in start:
+        if "alpha" in start:
+            raise ValueError("theta and alpha are both given; the one follows from the other")
+        return _alpha_of(start["theta"], gamma, mu, beta)
+    return start.get("alpha", steady["alpha"])
+
+
+def _alpha_of(theta: float, gamma: float, mu: float, beta: float) -> float:
     """Angle of attack of an aircraft with that pitch: the inverse of `complete`."""
     if mu == beta == 0.0:
         return theta - gamma

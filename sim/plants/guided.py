@@ -14,16 +14,12 @@ from ftcc.link.compiled import compiled
 from ftcc.sim.airframe import Airframe, attitude_rates
 from ftcc.sim.inner_loop import LoopState, deflections, load_factor, loop_rates
 from ftcc.sim.plant import (
-    AIRSPEED,
     ALPHA,
     BETA,
     CHI,
-    CLIMB,
     GAMMA,
-    INCIDENCE,
     MU,
     NUMBER,
-    SIDESLIP,
     P,
     Q,
     R,
@@ -31,6 +27,7 @@ from ftcc.sim.plant import (
     X,
     Y,
     Z,
+    beyond,
 )
 from ftcc.sim.plants.attitude import COMPLETED, complete
 from ftcc.sim.plants.position import ACTUATORS, DISTURBANCES, SERVES, Inputs
@@ -219,15 +216,7 @@ def lost(s, guards):
     speed, gamma, _, _, alpha, beta = _against(s, s.vx, s.vy, s.vz)
     if not (speed + abs(s.p) + abs(s.q) + abs(s.r) + abs(alpha) + abs(beta) < math.inf):
         return NUMBER
-    if guards.least_airspeed > speed:
-        return AIRSPEED
-    if abs(gamma) > guards.flight_path_angle:
-        return CLIMB
-    if abs(alpha) > guards.angle_of_attack:
-        return INCIDENCE
-    if abs(beta) > guards.sideslip:
-        return SIDESLIP
-    return 0
+    return beyond(speed, gamma, alpha, beta, guards)
 
 
 def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:

@@ -17,8 +17,9 @@ from ftcc.link.rotation import body_attitude
 from ftcc.sim.airframe import Deflections
 from ftcc.sim.jsbsim.flight import Driven, FlownAircraft, ModelState
 from ftcc.sim.jsbsim.steady import Steady, steady_flight
-from ftcc.sim.plant import AIRSPEED, ALPHA, BETA, CHI, CLIMB, GAMMA, INCIDENCE, MODEL, MU, SIDESLIP, P, Q, R, V, X, Y, Z
-from ftcc.sim.plants.attitude import COMPLETED, START, alpha_of, complete
+from ftcc.sim.plant import MODEL, beyond
+from ftcc.sim.plants.attitude import COMPLETED, START, alpha_at_start, complete
+from ftcc.sim.plants.guided import airspeed, truth
 from ftcc.sim.wind import AIR_CHANNELS, against, wind_speed
 
 __all__ = [
@@ -87,34 +88,12 @@ def driven(s, u, d, a):
 
 
 @compiled
-def airspeed(s):
-    """Speed over the ground, m/s; in still air the airspeed."""
-    return math.sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz)
-
-
-@compiled
-def truth(s, u, offset, out):
-    """Write the channels of ``plant.TRUTH`` that are states; all angles are against the velocity over the ground."""
-    out[X], out[Y], out[Z] = s.x, s.y, s.z
-    out[V], out[GAMMA], out[CHI], out[MU], out[ALPHA], out[BETA] = against(s.q0, s.q1, s.q2, s.q3, s.vx, s.vy, s.vz)
-    out[P], out[Q], out[R] = s.p, s.q, s.r
-
-
-@compiled
 def lost(s, guards):
     """Why a vehicle in this state is lost, a key of ``plant.LOST``; 0 if it is not."""
     speed, gamma, _, _, alpha, beta = against(s.q0, s.q1, s.q2, s.q3, s.vx, s.vy, s.vz)
     if not (speed + abs(s.z) + abs(s.p) + abs(s.q) + abs(s.r) + abs(alpha) + abs(beta) < math.inf):
         return MODEL
-    if guards.least_airspeed > speed:
-        return AIRSPEED
-    if abs(gamma) > guards.flight_path_angle:
-        return CLIMB
-    if abs(alpha) > guards.angle_of_attack:
-        return INCIDENCE
-    if abs(beta) > guards.sideslip:
-        return SIDESLIP
-    return 0
+    return beyond(speed, gamma, alpha, beta, guards)
 
 
 def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
@@ -126,11 +105,8 @@ def initial(start: Mapping[str, float], steady: Mapping[str, float]) -> State:
         If pitch and angle of attack are both given, or no angle of attack gives that pitch.
     """
     speed, gamma, chi, beta = start["V"], start.get("gamma", 0.0), start.get("chi", 0.0), start.get("beta", 0.0)
-    mu, alpha = start.get("mu", steady["mu"]), start.get("alpha", steady["alpha"])
-    if "theta" in start:
-        if "alpha" in start:
-            raise ValueError("theta and alpha are both given; the one follows from the other")
-        alpha = alpha_of(start["theta"], gamma, mu, beta)
+    mu = start.get("mu", steady["mu"])
+    alpha = alpha_at_start(start, steady, gamma, mu, beta)
     ground = speed * math.cos(gamma)
     return State(
         start.get("x", 0.0),

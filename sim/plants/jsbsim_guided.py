@@ -15,7 +15,7 @@ from ftcc.sim.inner_loop import LoopState, deflections, load_factor, loop_rates,
 from ftcc.sim.jsbsim.flight import Driven, FlownAircraft
 from ftcc.sim.jsbsim.steady import steady_flight
 from ftcc.sim.plants import jsbsim
-from ftcc.sim.plants.guided import surface_rate
+from ftcc.sim.plants.guided import State, surface_rate
 from ftcc.sim.plants.jsbsim import DISTURBANCES, Disturbances, airspeed, complete, lost, truth, wind_of
 from ftcc.sim.plants.position import ACTUATORS, COMPLETED, Inputs
 from ftcc.sim.wind import against
@@ -45,39 +45,6 @@ Parameters = Airframe
 BY_ATTITUDE = True
 SERVES = ("position",)
 START = ("V", "x", "y", "z", "gamma", "chi")
-
-
-class State(NamedTuple):
-    """A `ModelState`, then the surfaces and the inner loop."""
-
-    x: float
-    """North, m."""
-    y: float
-    """East, m."""
-    z: float
-    """Up, m."""
-    vx: float
-    """m/s."""
-    vy: float
-    vz: float
-    q0: float
-    """Attitude, body to north-east-down."""
-    q1: float
-    q2: float
-    q3: float
-    p: float
-    """Body rates, rad/s."""
-    q: float
-    r: float
-    aileron: float
-    """Surfaces, rad."""
-    elevator: float
-    rudder: float
-    n_r: float
-    """Inner loop, see `LoopState`."""
-    n_r_dot: float
-    mu_r: float
-    integral: float
 
 
 class Level(NamedTuple):

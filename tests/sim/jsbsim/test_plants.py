@@ -16,9 +16,9 @@ from ftcc.link.callbacks import NOBODY
 from ftcc.sim.build import build_fleet
 from ftcc.sim.faults import Fault
 from ftcc.sim.fleet import Fleet
-from ftcc.sim.jsbsim.flight import trouble_of
+from ftcc.sim.jsbsim.flight import ModelState, trouble_of
 from ftcc.sim.plant import LOST, MODEL, TRUTH
-from ftcc.sim.plants import cycle_of
+from ftcc.sim.plants import cycle_of, find
 from ftcc.sim.spec import VehicleSpec
 
 PERIOD_US, STEP_US = 20_000, 5000
@@ -92,3 +92,8 @@ def test_models_end_with_their_fleet() -> None:
     assert len(flight._flown) == before + 1
     del fleet
     assert len(flight._flown) == before
+
+
+@pytest.mark.parametrize("plant", ["jsbsim", "jsbsim_guided"])
+def test_a_state_begins_with_what_the_model_says(plant: str) -> None:
+    assert find(plant).State._fields[: len(ModelState._fields)] == ModelState._fields
