@@ -6,6 +6,7 @@ acknowledgements travel with their own transmissions.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ftcc.airside.group import AutopilotGroup
 from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.exchange import Header, begin, new_transmission, octets_of, problem_text, take_in
-from ftcc.link.gate import EventReport, Gate
+from ftcc.link.gate import EventReport, Gate, NetworkReport
 from ftcc.link.mesh import Mesh
 from ftcc.link.process import Setting
 
@@ -21,6 +22,8 @@ __all__ = ["Neighbourhood"]
 
 _EVERYTHING = 2**31 - 1
 """Number that stands for all transmissions, past and to come: of a process that has ended."""
+_NETWORK_PERIOD = 1.0
+"""Wall time between two reports on the network, s."""
 _MOST_RECORDS = 256
 """In a transmission."""
 
@@ -47,11 +50,17 @@ class Neighbourhood:
             group.on_mesh[0] = 1
             # A peer listens on the port of its process's first UAV; of two peers the later one connects.
             me = specs[0].uav
-            connect = [setting.ports[peer].mesh for peer in sorted(linked) if peer < me]
-            listen = setting.ports[me].mesh if any(peer > me for peer in linked) else None
+            connect = [setting.mesh_endpoint(peer) for peer in sorted(linked) if peer < me]
+            listen = setting.mesh_endpoint(me) if any(peer > me for peer in linked) else None
             # In lockstep an edge is subscribed to at both ends, for the acknowledgements.
             sources, targets = (linked, linked) if setting.lockstep else (senders, receivers)
-            self._mesh = Mesh(setting.swarm, me, sources, targets, listen, connect, setting.lockstep)
+            far = [peer for peer in linked if setting.is_far(peer)]
+            self._mesh = Mesh(
+                setting.swarm, me, sources, targets, listen, connect, setting.lockstep, setting.patience, far
+            )
+        self._own = specs[0].uav
+        self._traffic = self._mesh.traffic if self._mesh else {}
+        self._reported = time.monotonic()
         self._count()
 
     def fileno(self) -> int:
@@ -105,10 +114,19 @@ class Neighbourhood:
             self._warn_once(problem_text(problem, incoming))
             return
         header = Header(*incoming.words[: len(Header._fields)].tolist())
+        if sender in self._traffic and header.number != _EVERYTHING:
+            self._traffic[sender].numbered(header.number)
         if sender in self._newest:
             self._newest[sender] = header.number
         if sender in self._acknowledged:
             self._acknowledged[sender] = header.heard
+
+    def report_network(self, now_us: int) -> None:
+        """Report once a second, wall time, how the network serves the links with other computers."""
+        if self._traffic and time.monotonic() - self._reported >= _NETWORK_PERIOD:
+            self._reported = time.monotonic()
+            for sender, traffic in self._traffic.items():
+                self._gate.report(NetworkReport(self._own, sender, now_us, *traffic.report()))
 
     def _warn_once(self, text: str) -> None:
         self._bad += 1

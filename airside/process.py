@@ -236,6 +236,7 @@ class AutopilotProcess:
                 link.attend()
             self.write_if_held()
             self.warn_if_stalled()
+            self.neighbourhood.report_network(max(0, int(self.group.done.max())) * self.timing.period_us)
 
     def write_if_held(self) -> None:
         """Write what has been recorded when the swarm is held, for who looks now."""

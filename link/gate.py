@@ -22,6 +22,7 @@ __all__ = [
     "LawFailed",
     "Limit",
     "Lost",
+    "NetworkReport",
     "Pace",
     "Ready",
     "Release",
@@ -74,6 +75,31 @@ class EventReport:
     """The sender of the request that caused it, as "system/component"; empty without one."""
     outcome: str = ""
     """The answer to that request, such as "accepted" or "denied"."""
+
+
+@dataclass(frozen=True)
+class NetworkReport:
+    """Autopilot -> launcher: how the network between two computers has served one link of the mesh since the last one.
+
+    What the emulated radio does to the same records is recorded elsewhere, see ``link.channel.LinkReport``.
+    """
+
+    receiver: int
+    """First UAV of the receiving process."""
+    sender: int
+    """First UAV of the sending process."""
+    at_us: int
+    """Simulated time, us."""
+    received: int
+    """Transmissions that came."""
+    missing: int
+    """Transmissions that never came: a later one did."""
+    delay: float
+    """Mean time from sending to receiving by the clocks of the two computers, s; 0 where nothing came."""
+    longest_delay: float
+    """s."""
+    silence: float
+    """Longest wall time between two transmissions, s."""
 
 
 @dataclass(frozen=True)

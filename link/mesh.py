@@ -1,8 +1,8 @@
 """The mesh: one Zenoh peer per process, linked along the edges of the communication graph and to no others.
 
-No multicast, no gossip, no router, loopback only. A process puts one transmission on the mesh per exchange and
-subscribes to the processes of its in-neighbours. Zenoh's thread keeps what arrives and writes to a pipe: so a process
-can wait for the mesh and for its sockets at once.
+No multicast, no gossip, no router; loopback, unless the swarm flies on several computers. A process puts one
+transmission on the mesh per exchange and subscribes to the processes of its in-neighbours. Zenoh's thread keeps what
+arrives and writes to a pipe: so a process can wait for the mesh and for its sockets at once.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ import collections
 import contextlib
 import json
 import os
+import time
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from ftcc.link.mavlink import LOOPBACK
+from ftcc.link.traffic import Traffic
 
-__all__ = ["Mesh"]
+__all__ = ["Mesh", "configuration", "import_zenoh"]
 
 _RING = 16
 """Transmissions kept of each sender in real time."""
@@ -27,6 +29,14 @@ _RINGS = 64
 """Bytes read from the pipe at a time: there are one or two."""
 _RUNTIME = "(" + ", ".join(f"{pool}: (handover: app)" for pool in ("acc", "rx", "tx", "net")) + ")"
 """One thread for all of Zenoh's work: to hand a record from one to another costs more than to send it."""
+
+
+def import_zenoh() -> Any:
+    """The module zenoh, to be imported after a fork: the child of a process that has opened Zenoh never sends."""
+    os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
+    import zenoh
+
+    return zenoh
 
 
 class Mesh:
@@ -39,9 +49,12 @@ class Mesh:
     own : name of this process.
     hears : names of the processes whose transmissions this one receives.
     heard_by : names of those that receive this one's; the peer is ready when all of them have subscribed.
-    listen : port of this peer, or None if nobody connects to it.
-    connect : ports of the peers to connect to.
+    listen : endpoint of this peer, such as "tcp/127.0.0.1:20008", or None if nobody connects to it.
+    connect : endpoints of the peers to connect to.
     ordered : deliver every transmission in order (lockstep) instead of the newest ones (real time).
+    patience : wall time after which a link over which nothing comes counts as broken, s.
+    far : names of processes on other computers, whose traffic is measured.
+    security : further settings of Zenoh, see `mesh_security`; empty: links are not encrypted.
     """
 
     def __init__(
@@ -50,12 +63,14 @@ class Mesh:
         own: int,
         hears: Iterable[int],
         heard_by: Iterable[int],
-        listen: int | None,
-        connect: Iterable[int],
+        listen: str | None,
+        connect: Iterable[str],
         ordered: bool,
+        patience: float = 1.0,
+        far: Iterable[int] = (),
+        security: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
-        os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
-        import zenoh  # after the fork: the child of a process that has opened Zenoh never sends
+        zenoh = import_zenoh()
 
         self._zenoh = zenoh
         prefix = f"ftcc/{swarm}"
@@ -70,7 +85,11 @@ class Mesh:
             os.set_blocking(end, False)
         self.mail = np.zeros(1, np.int64)
         """(1,): 1 where something has arrived since the last `receive`; compiled code looks here between two ticks."""
-        self._session = zenoh.open(_configuration(zenoh, listen, connect))
+        far = set(far)
+        self.traffic = {sender: Traffic() for sender in hears if sender in far}
+        """By sender on another computer: what the network does to its transmissions."""
+        self._dated = bool(far)
+        self._session = zenoh.open(configuration(zenoh, listen, connect, patience, security))
         self._subscribers = [
             self._session.declare_subscriber(
                 f"{prefix}/{sender}/shared", self._keeper(sender), allowed_origin=zenoh.Locality.REMOTE
@@ -78,7 +97,10 @@ class Mesh:
             for sender in hears
         ]
         self._publisher = self._session.declare_publisher(
-            f"{prefix}/{own}/shared", congestion_control=zenoh.CongestionControl.BLOCK, express=True
+            f"{prefix}/{own}/shared",
+            # In real time a link that is down holds up nobody.
+            congestion_control=zenoh.CongestionControl.BLOCK if ordered else zenoh.CongestionControl.DROP,
+            express=True,
         )
         self._liveliness = self._session.liveliness().declare_subscriber(
             f"{prefix}/*/hears/{own}", self._greeted, history=True
@@ -88,9 +110,11 @@ class Mesh:
 
     def _keeper(self, sender: int) -> Callable[[Any], None]:
         """The handler, in Zenoh's thread, of samples of ``sender``: keep it, and write to the pipe."""
-        arrived = self._arrived[sender]
+        arrived, traffic = self._arrived[sender], self.traffic.get(sender)
 
         def keep(sample: Any) -> None:
+            if traffic is not None and sample.attachment is not None:
+                traffic.arrived(int.from_bytes(bytes(sample.attachment), "little"))
             arrived.append(bytes(sample.payload))
             self.mail[0] = 1
             if not self._rung:
@@ -119,7 +143,10 @@ class Mesh:
 
     def publish(self, payload: bytes) -> None:
         """Put a transmission on the mesh."""
-        self._publisher.put(payload)
+        if self._dated:
+            self._publisher.put(payload, attachment=time.time_ns().to_bytes(8, "little"))
+        else:
+            self._publisher.put(payload)
 
     def receive(self) -> list[tuple[int, bytes]]:
         """The transmissions that have arrived since the last call, with their senders; those of one in order."""
@@ -145,15 +172,36 @@ class Mesh:
         os.close(self._button)
 
 
-def _configuration(zenoh: Any, listen: int | None, connect: Iterable[int]) -> Any:
+def configuration(
+    zenoh: Any, listen: str | None, connect: Iterable[str], patience: float, security: Mapping[str, Any]
+) -> Any:
+    """Zenoh's configuration of a peer that speaks by the given endpoints alone; parameters as of `Mesh`."""
     settings: Mapping[str, Any] = {
         "mode": "peer",
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-        "listen": {"endpoints": [f"tcp/{LOOPBACK}:{listen}"] if listen else []},
+        "listen": {"endpoints": [listen] if listen else []},
         "connect": {
-            "endpoints": [f"tcp/{LOOPBACK}:{port}" for port in connect],
+            "endpoints": list(connect),
             "retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
         },
-        "transport": {"link": {"tx": {"lease": 1000}}, "shared_memory": {"enabled": False}},
+        "transport": {
+            "link": {
+                "tx": {
+                    "lease": round(1000.0 * patience),
+                    "queue": {"congestion_control": {"block": {"wait_before_close": round(1e6 * max(patience, 5.0))}}},
+                }
+            },
+            "shared_memory": {"enabled": False},
+        },
     }
-    return zenoh.Config.from_json5(json.dumps(settings))
+    return zenoh.Config.from_json5(json.dumps(merged(settings, security)))
+
+
+def merged(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """``settings`` with ``more``, table by table."""
+    result = dict(settings)
+    for name, value in more.items():
+        before = result.get(name)
+        both = isinstance(before, Mapping) and isinstance(value, Mapping)
+        result[name] = merged(before, value) if both else value
+    return result

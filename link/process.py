@@ -11,17 +11,18 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ftcc.link.gate import Gate, LauncherGoneError
+from ftcc.link.mavlink import LOOPBACK
 from ftcc.link.ports import UavPorts
 from ftcc.link.timing import Timing
 
-__all__ = ["RESEND", "Setting", "Stall", "Telemetry", "Waiter", "process_main"]
+__all__ = ["RESEND", "MeshPlace", "Setting", "Stall", "Telemetry", "Waiter", "process_main"]
 
 _TELEMETRY = 0.1
 """Least period of telemetry, simulated and wall s."""
@@ -29,6 +30,15 @@ RESEND = 0.05
 """Wall time after which a datagram that was not answered is sent again (lockstep), s."""
 _STALL = 10.0
 """Wall time without progress after which a process reports for which UAVs it waits, s."""
+
+
+class MeshPlace(NamedTuple):
+    """Where an autopilot process is reached by others of its mesh."""
+
+    computer: str
+    address: str
+    """Numeric."""
+    port: int
 
 
 @dataclass(frozen=True)
@@ -55,10 +65,31 @@ class Setting:
     """Added to a UAV's id to make its MAVLink system id towards the ground."""
     epoch_us: int = 0
     """Unix time that counts as simulated time 0, us."""
+    computer: str = ""
+    """Name of the computer on which the process runs; "" where all do."""
+    peers: Mapping[int, MeshPlace] = field(default_factory=dict)
+    """By the first UAV of each autopilot process, where its mesh is, if the swarm flies on several computers."""
+    patience: float = 1.0
+    """Wall time after which a mesh link over which nothing comes counts as broken, s."""
+    tls: Path | None = None
+    """Folder of keys: with it the mesh is encrypted, and speaks only to those who belong to it."""
 
     def system(self, uav: int) -> int:
         """MAVLink system id of a UAV towards the ground."""
         return uav + self.id_offset
+
+    def mesh_endpoint(self, peer: int) -> str:
+        """Where the mesh of an autopilot process, named by its first UAV, is reached: "tcp/127.0.0.1:20008"."""
+        scheme = "tcp" if self.tls is None else "tls"
+        if peer in self.peers:
+            place = self.peers[peer]
+            host = f"[{place.address}]" if ":" in place.address else place.address
+            return f"{scheme}/{host}:{place.port}"
+        return f"{scheme}/{LOOPBACK}:{self.ports[peer].mesh}"
+
+    def is_far(self, peer: int) -> bool:
+        """Whether an autopilot process, named by its first UAV, runs on another computer."""
+        return peer in self.peers and self.peers[peer].computer != self.computer
 
 
 class Waiter:

@@ -1,3 +1,8 @@
+from .children import Child as Child
+from .children import Exited as Exited
+from .children import LocalProcesses as LocalProcesses
+from .children import Part as Part
+from .children import no_main_module as no_main_module
 from .control import Control as Control
 from .control import SwarmError as SwarmError
 from .control import speed_factor as speed_factor
@@ -9,9 +14,9 @@ from .flight import Clock as Clock
 from .flight import FlightOptions as FlightOptions
 from .flight import Viewer as Viewer
 from .flight import fly_swarm as fly_swarm
+from .launcher import Elsewhere as Elsewhere
 from .launcher import Outcome as Outcome
 from .launcher import automatic_pack as automatic_pack
-from .launcher import no_main_module as no_main_module
 from .open_files import provide_files as provide_files
 from .preparing import check_choices as check_choices
 from .preparing import prepare_flight as prepare_flight

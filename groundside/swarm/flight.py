@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ftcc.groundside.dashboard import Event, Feed, Pace
 from ftcc.groundside.swarm.in_progress import FlightInProgress, Progress
-from ftcc.groundside.swarm.launcher import Outcome, SwarmProcesses, automatic_pack
+from ftcc.groundside.swarm.launcher import Elsewhere, Outcome, SwarmProcesses, automatic_pack
 from ftcc.groundside.swarm.monitor import Monitor
 from ftcc.groundside.swarm.open_files import provide_files
 from ftcc.groundside.swarm.pace import Setup, usable_cores
@@ -68,6 +68,8 @@ class FlightOptions:
     """Key file for signed MAVLink messages to the ground."""
     id_offset: int = 0
     """MAVLink system id of a UAV minus its id."""
+    tls: Path | None = None
+    """Folder of keys, with which the mesh is encrypted and speaks only to those who belong to it."""
 
 
 def fly_swarm(
@@ -77,6 +79,7 @@ def fly_swarm(
     report: Callable[[Event], None],
     progress: Progress,
     started: Callable[[str | None], None],
+    elsewhere: Elsewhere | None = None,
 ) -> Outcome:
     """Fly ``mission`` and leave a complete run in ``options.folder``.
 
@@ -85,6 +88,7 @@ def fly_swarm(
     report : called with every event.
     progress : called with the simulated time, the pace and the late ticks, up to ten times per second.
     started : called once when all processes are ready, with the viewer's address or None.
+    elsewhere : the processes on other computers, which have joined.
 
     Ctrl-C and SIGTERM end the flight in an orderly way.
 
@@ -106,7 +110,7 @@ def fly_swarm(
         flight.log_event(event)
 
     # The fork server must exist before this process opens anything.
-    swarm = _start_swarm(mission, options, ports, run_started, on_event)
+    swarm = _start_swarm(mission, options, ports, run_started, on_event, elsewhere)
     station = _station(mission, options, ports, run_started)
     flight = FlightInProgress(
         mission, swarm, station, None, None, EventLog(folder / "events.jsonl"), report, _pacing(mission, options)
@@ -135,7 +139,12 @@ def fly_swarm(
 
 
 def _start_swarm(
-    mission: Mission, options: FlightOptions, ports: PortBlock, run_started: float, on_event: Callable[[Event], None]
+    mission: Mission,
+    options: FlightOptions,
+    ports: PortBlock,
+    run_started: float,
+    on_event: Callable[[Event], None],
+    elsewhere: Elsewhere | None,
 ) -> SwarmProcesses:
     """Start all processes of the swarm."""
     swarm = SwarmProcesses(
@@ -150,6 +159,8 @@ def _start_swarm(
         key=options.key,
         id_offset=options.id_offset,
         started=run_started,
+        elsewhere=elsewhere,
+        tls=options.tls,
         on_event=on_event,
     )
     swarm.start()
@@ -175,6 +186,7 @@ def _end_processes(flight: FlightInProgress) -> None:
     until = time.monotonic() + _END_TIMEOUT
     while not flight.swarm.over and time.monotonic() <= until:
         _poll(flight, None, _ignore_progress)
+    flight.swarm.collect(lambda: _poll(flight, None, _ignore_progress))
     flight.swarm.release()
 
 

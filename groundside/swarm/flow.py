@@ -12,7 +12,7 @@ from ftcc.link.gate import Limit, Pace
 __all__ = ["START", "Flow", "FlowError"]
 
 START = 0.05
-"""Wall time between sending a pace and its first tick, s."""
+"""Wall time between sending a pace and its first tick, where all processes run on this computer, s."""
 
 
 class FlowError(ValueError):
@@ -29,6 +29,7 @@ class Flow:
     held : start held before tick 0.
     send : sends a message to all processes.
     flying : returns the names of the vehicle processes that still fly.
+    start : wall time between sending a pace and its first tick, s: it must have arrived everywhere.
     """
 
     def __init__(
@@ -39,12 +40,14 @@ class Flow:
         held: bool,
         send: Callable[[Any], None],
         flying: Callable[[], Iterable[str]],
+        start: float = START,
     ) -> None:
         self.period = period
         self.speed = speed
         self.lockstep = lockstep
         self._send = send
         self._flying = flying
+        self._start = start
         self._ticks: dict[str, int] = {}
         """Tick before which each process is held."""
         self._pace = Pace(0.0, 0, speed)
@@ -54,7 +57,7 @@ class Flow:
 
     def begin(self) -> tuple[Pace, Limit]:
         """Start the clock and return pace and limit of the first ticks."""
-        self._pace = Pace(time.monotonic() + START, 0, self.speed)
+        self._pace = Pace(time.monotonic() + self._start, 0, self.speed)
         return self._pace, Limit(-1 if self.state == "held" else None)
 
     def pause(self) -> None:
@@ -118,11 +121,11 @@ class Flow:
             return
         if self.lockstep:
             # The current tick is not known here: each process continues from its own, and waits for the others.
-            self._pace = Pace(time.monotonic() + START, None, speed)
+            self._pace = Pace(time.monotonic() + self._start, None, speed)
         else:
             # All processes change at the same tick, which is due soon.
             begun = self._pace.tick or 0
-            ahead = (time.monotonic() + START - self._pace.wall) * self._pace.speed / self.period
+            ahead = (time.monotonic() + self._start - self._pace.wall) * self._pace.speed / self.period
             tick = begun + max(0, int(ahead))
             due = self._pace.wall + (tick - begun) * self.period / self._pace.speed
             self._pace = Pace(due, tick, speed)
@@ -134,6 +137,6 @@ class Flow:
 
     def _continue_from(self, tick: int, limit: Limit) -> None:
         self._ticks.clear()
-        self._pace = Pace(time.monotonic() + START, tick, self.speed)
+        self._pace = Pace(time.monotonic() + self._start, tick, self.speed)
         self._send(self._pace)
         self._send(limit)

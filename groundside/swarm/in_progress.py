@@ -74,7 +74,7 @@ class FlightInProgress:
             time.monotonic(),
             self.station.t,
             (self.station.late, flown),
-            [(child.name, child.process.pid or 0, child.kind) for child in self.swarm.flying],
+            [(child.name, child.process.pid or 0, child.kind) for child in self.swarm.local],
             self.dashboard.pids if self.dashboard is not None else [],
         )
         if text:

@@ -1,48 +1,38 @@
-"""Launch a swarm: start its processes together, monitor them, and end them.
+"""The swarm of one run, as its launcher sees it: started together, judged by what its processes say, and ended.
 
-The launcher handles processes, ports and pipes, not physics. Children are forked from a fork server that has loaded all
-compiled code. Each child has a log; if it dies, the end of the log is reported.
+Its processes run on this computer (`children`) or, if some are placed on others, there too (`Elsewhere`). The launcher
+handles processes, ports and messages, not physics.
 """
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
-import multiprocessing.connection
 import os
 import selectors
-import subprocess
-import sys
-import threading
 import time
-import types
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 from ftcc.groundside.dashboard import Event
-from ftcc.groundside.swarm.flow import Flow
-from ftcc.groundside.swarm.preloading import ACTIVE_VARIABLE, PLANT_VARIABLE, SCHEME_VARIABLE
-from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, LawFailed, Lost, Ready, Release, Stop
+from ftcc.groundside.swarm.children import Child, Exited, LocalChild, LocalProcesses, Part, Role
+from ftcc.groundside.swarm.flow import START, Flow
+from ftcc.groundside.swarm.network_log import NetworkLog
+from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, LawFailed, Lost, NetworkReport, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
-from ftcc.link.process import Setting, process_main
+from ftcc.link.process import Setting
 from ftcc.link.recording import AIRCRAFT_LOST
 
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
     from ftcc.groundside.verdict import Verdict
 
-__all__ = ["Child", "Outcome", "SwarmProcesses", "automatic_pack"]
+__all__ = ["Elsewhere", "Outcome", "SwarmProcesses", "automatic_pack", "grouped"]
 
 _END_TIMEOUT = 1.2
 """Time for processes to end by themselves, wall s."""
 _ENDED_ON_REQUEST = (0, 3, 255, -9, -15)
 """Exit codes that are normal after a stop, also for SIGTERM to the process group or a fork server that ended first."""
-_TAIL_LINES = 12
-"""Lines of a dead process's log that are reported."""
 
 
 def automatic_pack(uavs: int) -> int:
@@ -51,27 +41,47 @@ def automatic_pack(uavs: int) -> int:
     return max(1, -(-uavs // pairs))
 
 
-Role = Literal["vehicle", "autopilot"]
-"""Kind of a process."""
+def grouped(uavs: Sequence[int], pack: int, place: Callable[[int], Any] = lambda _: None) -> list[tuple[int, ...]]:
+    """Return which UAVs fly in one process: at most ``pack``, and only those with the same ``place``."""
+    groups: list[tuple[int, ...]] = []
+    for uav in uavs:
+        if groups and len(groups[-1]) < pack and place(groups[-1][0]) == place(uav):
+            groups[-1] += (uav,)
+        else:
+            groups.append((uav,))
+    return groups
 
 
-@dataclass
-class Child:
-    """One process of the swarm."""
+class Elsewhere(Protocol):
+    """The processes of a swarm that run on other computers."""
 
-    name: str
-    uavs: tuple[int, ...]
-    kind: Role
-    process: BaseProcess
-    pipe: Connection
-    ready: bool = False
-    ended: Ended | None = None
-    dead: bool = False
+    children: Sequence[Child]
+    start_delay: float
+    """Wall time that a pace needs to reach them, s."""
 
-    def send(self, message: Any) -> None:
-        """Send a message; a child that has ended is detected by its sentinel."""
-        with contextlib.suppress(BrokenPipeError, ConnectionResetError, OSError):
-            self.pipe.send(message)
+    def place(self, uav: int) -> tuple[str, str]:
+        """Return where the vehicle and the autopilot of a UAV fly; "" stands for this computer."""
+        ...
+
+    def start(self, setting: Setting, parts: Sequence[Part]) -> Setting:
+        """Start ``parts`` there; return the setting of this computer's processes, which now know where the others are."""
+        ...
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable if something has come from there."""
+        ...
+
+    def poll(self) -> Iterable[tuple[Child | None, Any]]:
+        """Return what has come: messages of the gate and `Exited`, each with its process."""
+        ...
+
+    def collect(self, wait: Callable[[], None]) -> None:
+        """Bring the parts of the recording home, calling ``wait`` while they come."""
+        ...
+
+    def release(self) -> None:
+        """End what is left there."""
+        ...
 
 
 @dataclass
@@ -100,41 +110,6 @@ class Outcome:
         return not (self.died or self.lost or self.law_error)
 
 
-_main_module_lock = threading.Lock()
-"""Swarms may be started by several threads."""
-
-
-_compiled: list[tuple[str, str, bool]] = []
-"""Scheme, plant and whether with active fault tolerance: what has flown; the fork server has loaded the first."""
-
-
-def _compile_beside_fork_server(what: tuple[str, str, bool]) -> None:
-    """Compile what the fork server, which runs already, has not loaded: otherwise each child would, at the same time.
-
-    Where this fails, the children do it, and report what is wrong.
-    """
-    if _compiled and what not in _compiled:
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        load = [sys.executable, "-c", "import ftcc.groundside.swarm.preload"]
-        subprocess.run(
-            load, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            check=False,
-        )  # fmt: skip
-    _compiled.append(what)
-
-
-@contextlib.contextmanager
-def no_main_module() -> Iterator[None]:
-    """Keep children from importing the program that started this process."""
-    with _main_module_lock:
-        main = sys.modules["__main__"]
-        sys.modules["__main__"] = types.ModuleType("__main__")
-        try:
-            yield
-        finally:
-            sys.modules["__main__"] = main
-
-
 class SwarmProcesses:
     """The processes of one run.
 
@@ -151,6 +126,8 @@ class SwarmProcesses:
     key : key file for signed MAVLink messages to the ground.
     id_offset : MAVLink system id of a UAV minus its id.
     started : Unix time of simulated time 0, s; default: now.
+    elsewhere : the processes on other computers, which have joined.
+    tls : folder of keys, with which the mesh is encrypted and speaks only to those who belong to it.
     on_event : called with every event.
     """
 
@@ -168,6 +145,8 @@ class SwarmProcesses:
         key: Path | None = None,
         id_offset: int = 0,
         started: float | None = None,
+        elsewhere: Elsewhere | None = None,
+        tls: Path | None = None,
         on_event: Callable[[Event], None],
     ) -> None:
         self.mission = mission
@@ -175,13 +154,23 @@ class SwarmProcesses:
         self.lockstep = lockstep
         self.on_event = on_event
         self.outcome = Outcome()
+        self._network = NetworkLog(folder)
         self.children: list[Child] = []
-        self._selector = selectors.DefaultSelector()
         self.stopping_since: float | None = None
-        self.flow = Flow(mission.timing.period, speed, lockstep, held, self.send_to_all, self._flying_vehicles)
+        self._elsewhere = elsewhere
+        self._place: Callable[[int], tuple[str, str]] = elsewhere.place if elsewhere else lambda _: ("", "")
+        self.flow = Flow(
+            mission.timing.period,
+            speed,
+            lockstep,
+            held,
+            self.send_to_all,
+            self._flying_vehicles,
+            elsewhere.start_delay if elsewhere else START,
+        )
         uavs = [spec.uav for spec in mission.vehicles]
-        groups = [tuple(uavs[start : start + pack]) for start in range(0, len(uavs), pack)]
-        self.setting = Setting(
+        groups = grouped(uavs, pack, self._place)
+        setting = Setting(
             swarm=f"{folder.name}-{os.getpid()}",
             timing=mission.timing,
             lockstep=lockstep,
@@ -194,53 +183,29 @@ class SwarmProcesses:
             home=mission.home,
             id_offset=id_offset,
             epoch_us=round((time.time() if started is None else started) * 1e6),
+            tls=tls,
         )
-        self.groups = groups
+        self._parts = [Part(kind, group) for group in groups for kind in get_args(Role)]
+        if elsewhere:
+            setting = elsewhere.start(setting, [part for part in self._parts if self._flies_elsewhere(part)])
+        self._here = LocalProcesses(mission, setting)
+        self._selector = selectors.DefaultSelector()
+        for source in (self._here, *([elsewhere] if elsewhere else [])):
+            self._selector.register(source, selectors.EVENT_READ)
+
+    def _flies_elsewhere(self, part: Part) -> bool:
+        """Return whether a part is placed on another computer."""
+        return bool(self._place(part.uavs[0])[0 if part.kind == "vehicle" else 1])
 
     def start(self) -> None:
-        """Start all processes."""
-        # Imported here, because only the children need them.
-        from ftcc.airside.process import main as run_autopilots
-        from ftcc.airside.spec import is_active
-        from ftcc.sim.process import main as run_vehicles
+        """Start all processes on this computer; those elsewhere have been told to start."""
+        self._here.start([part for part in self._parts if not self._flies_elsewhere(part)])
+        self.children = [*self._here.children, *(self._elsewhere.children if self._elsewhere else ())]
 
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        os.environ[SCHEME_VARIABLE] = self.mission.scheme.name
-        os.environ[PLANT_VARIABLE] = self.mission.plant
-        active = is_active(self.mission.autopilots)
-        os.environ[ACTIVE_VARIABLE] = str(int(active))
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["ftcc.groundside.swarm.preload"])
-        _compile_beside_fork_server((self.mission.scheme.name, self.mission.plant, active))
-        vehicles = {spec.uav: spec for spec in self.mission.vehicles}
-        autopilots = {spec.uav: spec for spec in self.mission.autopilots}
-        with no_main_module():
-            for group in self.groups:
-                self._spawn(context, "vehicle", group, run_vehicles, [vehicles[uav] for uav in group])
-                self._spawn(context, "autopilot", group, run_autopilots, [autopilots[uav] for uav in group])
-
-    def _spawn(
-        self,
-        context: Any,
-        kind: Literal["vehicle", "autopilot"],
-        group: tuple[int, ...],
-        run: Callable[..., None],
-        specs: Sequence[Any],
-    ) -> None:
-        span = f"{group[0]}" if len(group) == 1 else f"{group[0]}-{group[-1]}"
-        name = f"uav{span}-{kind}"
-        ours, theirs = context.Pipe()
-        # A daemon process ends with the launcher, even if the launcher ends before it has sent a stop, as with Ctrl-C
-        # while processes start. Otherwise each would wait for the other forever.
-        process = context.Process(
-            target=process_main, args=(name, theirs, self.setting, run, specs), name=name, daemon=True
-        )
-        process.start()
-        theirs.close()
-        child = Child(name, group, kind, process, ours)
-        self.children.append(child)
-        for source in (ours, process.sentinel):
-            self._selector.register(source, selectors.EVENT_READ, child)
+    @property
+    def local(self) -> list[LocalChild]:
+        """Return the processes on this computer that still fly."""
+        return [child for child in self._here.children if not (child.ended or child.dead)]
 
     @property
     def ready(self) -> bool:
@@ -282,22 +247,32 @@ class SwarmProcesses:
         return self._selector.fileno()
 
     def poll(self) -> None:
-        """Handle the messages of the processes, and detect processes that have ended."""
-        for child in {key.data.name: key.data for key, _ in self._selector.select(0.0)}.values():
-            with contextlib.suppress(EOFError, ConnectionResetError):
-                while child.pipe.poll():
-                    self._handle_message(child, child.pipe.recv())
-            if not child.process.is_alive():
-                self._handle_exit(child)
-        if self.stopping_since is not None and time.monotonic() - self.stopping_since > _END_TIMEOUT:
+        """Handle the messages of the processes, and of those that have ended."""
+        came = [*self._here.poll(), *(self._elsewhere.poll() if self._elsewhere else ())]
+        for child, message in came:
+            self._handle_message(child, message)
+        if self.stopping_since is not None and time.monotonic() - self.stopping_since > self._end_timeout:
             for child in self.children:
                 if not (child.ended or child.dead):
-                    child.process.kill()
+                    child.kill()
 
-    def _handle_message(self, child: Child, message: Any) -> None:
+    @property
+    def _end_timeout(self) -> float:
+        return _END_TIMEOUT + (2.0 * self._elsewhere.start_delay if self._elsewhere else 0.0)
+
+    def _handle_message(self, child: Child | None, message: Any) -> None:
+        """Handle a message of a process, or of another computer."""
         match message:
+            case EventReport(severity, text, uav, at_us, who, outcome):
+                self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
+            case NetworkReport():
+                self._network.write(message)
+            case _ if child is None:
+                raise ValueError(f"{message} belongs to a process")
             case Ready():
                 child.ready = True
+            case Exited():
+                self._handle_exit(child, message)
             case Ended(tick, late, ticks):
                 child.ended = message
                 self.outcome.flown = max(self.outcome.flown, min(tick, self.mission.timing.ticks))
@@ -314,23 +289,15 @@ class SwarmProcesses:
                     self.outcome.law_error = text
                     self.on_event(Event(at_us / 1e6, "error", text))
                 self.stop()
-            case EventReport(severity, text, uav, at_us, who, outcome):
-                self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
 
-    def _handle_exit(self, child: Child) -> None:
+    def _handle_exit(self, child: Child, exited: Exited) -> None:
         """Handle the end of a process: if unexpected, report it, stop its partner, and make no other wait for it."""
         child.dead = True
-        for source in (child.pipe, child.process.sentinel):
-            self._selector.unregister(source)
-        child.process.join()
         if child.ended:
             return
-        if self.stopping_since is None or child.process.exitcode not in _ENDED_ON_REQUEST:
+        if self.stopping_since is None or exited.code not in _ENDED_ON_REQUEST:
             self.outcome.died.append(child.name)
-            code = child.process.exitcode
-            how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-            tail = self.log_tail(child.name)
-            self.on_event(Event(-1.0, "error", f"process {child.name} died ({how})" + (f": {tail}" if tail else "")))
+            self.on_event(Event(-1.0, "error", f"process {child.name} {exited}"))
         for other in self.children:
             if other.uavs == child.uavs:
                 other.send(Stop())
@@ -338,21 +305,15 @@ class SwarmProcesses:
                 for uav in child.uavs:
                     other.send(Gone(uav))
 
-    def log_tail(self, name: str) -> str:
-        """Return the last lines of a process's log."""
-        path = self.folder / "logs" / f"{name}.log"
-        lines = path.read_text(errors="replace").strip().splitlines() if path.exists() else []
-        return "\n".join(lines[-_TAIL_LINES:])
+    def collect(self, wait: Callable[[], None]) -> None:
+        """Bring home what was recorded on other computers, calling ``wait`` meanwhile; all processes have ended."""
+        if self._elsewhere:
+            self._elsewhere.collect(wait)
 
     def release(self) -> None:
         """Release the processes, which have all ended their flight, and wait until they exit."""
         self._selector.close()
-        for child in self.children:
-            child.send(Release())
-        until = time.monotonic() + _END_TIMEOUT
-        for child in self.children:
-            child.process.join(max(0.0, until - time.monotonic()))
-            if child.process.is_alive():
-                child.process.kill()
-                child.process.join()
-            child.pipe.close()
+        self.send_to_all(Release())
+        self._here.release()
+        if self._elsewhere:
+            self._elsewhere.release()

@@ -19,8 +19,9 @@ from ftcc.link.mesh import Mesh
 class Peer:
     """The commands; numbered transmissions are a process's name and a number."""
 
-    def open(self, **arguments: Any) -> list[str]:
-        self.mesh = Mesh(**arguments)
+    def open(self, *, listen: int | None, connect: list[int], **arguments: Any) -> list[str]:
+        here = "tcp/127.0.0.1:{}".format
+        self.mesh = Mesh(**arguments, listen=here(listen) if listen else None, connect=[here(port) for port in connect])
         return self.mesh.awaited
 
     def wait_until_ready(self, seconds: float) -> bool:

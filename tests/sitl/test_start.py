@@ -14,17 +14,17 @@ from tests.sitl.conftest import Flight
 INTERRUPTED = """
 import sys
 from ftcc.groundside.cli import main
-from ftcc.groundside.swarm.launcher import SwarmProcesses
+from ftcc.groundside.swarm.children import LocalProcesses
 
-spawn = SwarmProcesses._spawn
+spawn = LocalProcesses._spawn
 
-def interrupted(self, context, kind, *rest):
-    if kind == "autopilot":
+def interrupted(self, context, part, *rest):
+    if part.kind == "autopilot":
         print("process", self.children[0].process.pid, flush=True)
         raise KeyboardInterrupt
-    spawn(self, context, kind, *rest)
+    spawn(self, context, part, *rest)
 
-SwarmProcesses._spawn = interrupted
+LocalProcesses._spawn = interrupted
 sys.argv = ["ftcc", "fly", "demo", "--viewer", "none", "--mavlink", "none", "--out", sys.argv[1]]
 main()
 """
