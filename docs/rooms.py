@@ -21,6 +21,7 @@ LABELS = {
     "simulation": "flight in one process",
     "dashboard": "live view",
     "doors": "PX4, ArduPilot",
+    "nodes": "several computers",
     "results": "a run's folder",
     "generator": "scenarios in a line",
     "jsbsim": "aircraft for JSBSim",

@@ -19,6 +19,7 @@ from ftcc.groundside.cli import (
     identify,
     movie,
     new,
+    node,
     results,
     scenarios,
     search,
@@ -56,7 +57,7 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         airframe.airframe,
         identify.identify,
     ),
-    "Flights": (fly.fly, vehicle.vehicle, swarms.ps, swarms.stop, view.watch, swarms.doctor),
+    "Flights": (fly.fly, node.node, vehicle.vehicle, swarms.ps, swarms.stop, view.watch, swarms.doctor),
     "Results": (results.report, results.export, results.compare, movie.movie, view.replay),
     "Commands to a running swarm": (
         ground.vehicles,

@@ -18,6 +18,7 @@ EXAMPLES = {
     "ftcc airframe": "ftcc airframe --airspeed 25 --airspeed 30 --coefficient CLde=1.1",
     "ftcc identify": "ftcc identify c172p --airspeed 50 --gains containment",
     "ftcc fly": "ftcc fly containment --speed 5 --viewer none --duration 60",
+    "ftcc node": "ftcc node demo --join 10.0.0.1:7447 --name b --tls keys",
     "ftcc vehicle": "ftcc vehicle attitude_synchronization --uav 2 --px4 4561",
     "ftcc ps": "ftcc ps",
     "ftcc stop": "ftcc stop --all",

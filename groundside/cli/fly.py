@@ -21,11 +21,14 @@ from ftcc.groundside.cli.common import (
     load_mission,
     scenario_names,
 )
-from ftcc.groundside.cli.flight_output import FlightOutput, JsonOutput, TerminalOutput
+from ftcc.groundside.cli.flight_output import FlightOutput, JsonOutput, TerminalOutput, print_line
+from ftcc.groundside.cli.node import Insecure, Tls, check_secrecy
 from ftcc.groundside.cli.vehicle import check_door_options, fly_by_px4
 
 if TYPE_CHECKING:
-    from ftcc.groundside.swarm import Outcome
+    from ftcc.groundside.nodes import Nodes, NodesPlan
+    from ftcc.groundside.scenario import Mission
+    from ftcc.groundside.swarm import FlightOptions, Outcome
     from ftcc.link.ports import PortBlock
 
 __all__ = ["fly"]
@@ -33,6 +36,8 @@ __all__ = ["fly"]
 _FLIGHT_FAILED = 1
 _MISTAKE = 2
 """As of other bad input."""
+_LOOK = 0.2
+"""Longest wait for a node before Ctrl-C is looked at, wall s."""
 
 
 def fly(
@@ -75,6 +80,13 @@ def fly(
         bool, typer.Option("--json", help="Print progress, events and outcome as JSON, an object per line.")
     ] = False,
     strict: Strict = False,
+    nodes: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Fly on several computers, as this file says; see `ftcc node`."),
+    ] = None,
+    ssh: Annotated[bool, typer.Option("--ssh", help="With --nodes: start `ftcc node` there by ssh.")] = False,
+    tls: Tls = None,
+    insecure: Insecure = False,
     px4: Annotated[
         Path | None,
         typer.Option(
@@ -105,11 +117,16 @@ def fly(
             id_offset=id_offset != 0,
             json=json,
             strict=strict,
+            nodes=nodes is not None,
+            tls=tls is not None,
         )
         build = find_px4(px4, px4_model)
         fly_by_px4(load_mission(scenario, form, variant, settings, seed, duration), build, out, factor)
         return
+    plan = _plan_of(nodes, ssh, tls, insecure)
     mission = load_mission(scenario, form, variant, settings, seed, duration)
+    if plan is not None:
+        plan.require_in(spec.uav for spec in mission.vehicles)
     options, ports = prepare_flight(
         mission,
         out,
@@ -123,22 +140,72 @@ def fly(
         mavlink=mavlink,
         key=key,
         id_offset=id_offset,
+        tls=tls,
     )
     output: FlightOutput = (JsonOutput if json else TerminalOutput)(mission, options)
-    outcome = _fly(output, ports)
+    outcome = _fly(output, ports, None if plan is None else _gathered(plan, ssh, mission, options, ports, json))
     code = _exit_code(outcome, strict)
     output.end(outcome, time.monotonic() - output.begun, code)
     if code:
         raise typer.Exit(code)
 
 
-def _fly(output: FlightOutput, ports: PortBlock) -> Outcome:
+def _plan_of(nodes: Path | None, ssh: bool, tls: Path | None, insecure: bool) -> NodesPlan | None:
+    """Return which computers take part, or None if none does beside this one."""
+    if nodes is None:
+        if ssh or insecure:
+            fail(f"{'--ssh' if ssh else '--insecure'}: belongs to --nodes")
+        return None
+    from ftcc.groundside.nodes import read_plan
+
+    check_secrecy(tls, insecure)
+    return read_plan(nodes)
+
+
+def _gathered(
+    plan: NodesPlan, ssh: bool, mission: Mission, options: FlightOptions, ports: PortBlock, json: bool
+) -> Nodes:
+    """Wait until all other computers are there."""
+    from multiprocessing.connection import wait
+
+    from ftcc.groundside.nodes import Nodes
+
+    gathered = Nodes(
+        plan,
+        mission,
+        options.folder,
+        ports,
+        lockstep=options.lockstep,
+        signed=options.key is not None,
+        tls=options.tls,
+    )
+
+    def say(text: str) -> None:
+        if json:
+            print_line("node", text=text)
+        else:
+            print(text, flush=True)
+
+    try:
+        if ssh:
+            gathered.start_by_ssh()
+        gathered.gather(say, lambda descriptor: wait([descriptor], _LOOK))
+    except BaseException:
+        gathered.close()
+        ports.release()
+        raise
+    return gathered
+
+
+def _fly(output: FlightOutput, ports: PortBlock, elsewhere: Nodes | None) -> Outcome:
     """Fly, with events and progress on standard output."""
     from ftcc.groundside.swarm import fly_swarm
 
     with output:
         try:
-            return fly_swarm(output.mission, output.options, ports, output.event, output.progress, output.started)
+            return fly_swarm(
+                output.mission, output.options, ports, output.event, output.progress, output.started, elsewhere
+            )
         except TimeoutError as error:
             output.not_ready(str(error))
             raise typer.Exit(_FLIGHT_FAILED) from error

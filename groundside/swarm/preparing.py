@@ -61,6 +61,7 @@ def prepare_flight(
     mavlink: Sequence[str] | None = None,
     key: Path | None = None,
     id_offset: int = 0,
+    tls: Path | None = None,
 ) -> tuple[FlightOptions, PortBlock]:
     """Check how a mission is to fly, create its folder and reserve its ports.
 
@@ -105,6 +106,7 @@ def prepare_flight(
             listeners=listeners,
             key=key,
             id_offset=id_offset,
+            tls=tls,
         )
     except BaseException:
         ports.release()

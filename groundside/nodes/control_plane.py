@@ -1,0 +1,176 @@
+"""How the leading computer and the nodes reach each other: one Zenoh session each, linked to the lead alone.
+
+Messages of the gate, datagrams and files travel under keys of their own. What arrives is kept for the main loop, which
+waits for a descriptor; datagrams are handed on at once, in Zenoh's thread.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import os
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ftcc.groundside.nodes.messages import MessageError, decode, encode
+from ftcc.link.mesh import configuration, import_zenoh
+
+__all__ = ["Bell", "ControlPlane", "for_node", "from_node"]
+
+_PREFIX = "ftcc/nodes"
+_JOIN = f"{_PREFIX}/lead/join"
+_CLOCK = f"{_PREFIX}/lead/clock"
+_LEAD_ALIVE = f"{_PREFIX}/lead/alive"
+
+
+def for_node(name: str, what: str) -> str:
+    """Return the key of what the lead sends to a node: "message", "datagram"."""
+    return f"{_PREFIX}/lead/to/{name}/{what}"
+
+
+def from_node(name: str, what: str) -> str:
+    """Return the key of what a node sends: "message", "datagram", "file"; or its token, "alive"."""
+    return f"{_PREFIX}/node/{name}/{what}"
+
+
+class Bell:
+    """Wakes up who waits for a descriptor, from any thread."""
+
+    def __init__(self) -> None:
+        self._event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+
+    def ring(self) -> None:
+        """Make the descriptor readable."""
+        os.eventfd_write(self._event, 1)
+
+    def silence(self) -> None:
+        """Make it unreadable until the next `ring`."""
+        with contextlib.suppress(BlockingIOError):
+            os.eventfd_read(self._event)
+
+    def fileno(self) -> int:
+        """Return the descriptor, for ``select``."""
+        return self._event
+
+    def close(self) -> None:
+        """Free the descriptor."""
+        os.close(self._event)
+
+
+class ControlPlane:
+    """One end.
+
+    Parameters
+    ----------
+    listen, connect : endpoints of Zenoh, such as "tls/10.0.0.1:7447"; the lead listens, a node connects.
+    patience : silence after which a link counts as broken, wall s.
+    security : see `Mesh`.
+    """
+
+    def __init__(self, listen: str | None, connect: str | None, patience: float, security: Mapping[str, Any]) -> None:
+        self._zenoh = import_zenoh()
+        connects = [connect] if connect else []
+        self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, patience, security))
+        self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
+        self._bell = Bell()
+        self._declared: list[Any] = []
+        self.refused = 0
+        """What came and was no message."""
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable where something has come."""
+        return self._bell.fileno()
+
+    def take(self) -> list[tuple[str, Any]]:
+        """Return what has come since the last call: each with the name of its sender."""
+        self._bell.silence()
+        came = []
+        while self._arrived:
+            came.append(self._arrived.popleft())
+        return came
+
+    def keep(self, sender: str, what: Any) -> None:
+        """Keep something for `take`; from any thread."""
+        self._arrived.append((sender, what))
+        self._bell.ring()
+
+    def send(self, key: str, message: Any) -> None:
+        """Send a message; it waits where the link is busy."""
+        self._session.put(key, encode(message), congestion_control=self._zenoh.CongestionControl.BLOCK, express=True)
+
+    def send_bytes(self, key: str, data: bytes, droppable: bool) -> None:
+        """Send bytes; where the link is busy, droppable ones are lost."""
+        control = self._zenoh.CongestionControl
+        self._session.put(key, data, congestion_control=control.DROP if droppable else control.BLOCK, express=droppable)
+
+    def listen_for_messages(self, key: str, sender: str) -> None:
+        """Keep the messages that come under a key."""
+
+        def keep(sample: Any) -> None:
+            try:
+                self.keep(sender, decode(bytes(sample.payload)))
+            except MessageError:
+                self.refused += 1
+
+        self._declared.append(self._session.declare_subscriber(key, keep))
+
+    def listen_for_bytes(self, key: str, take: Callable[[bytes], None]) -> None:
+        """Give ``take`` the bytes that come under a key, in Zenoh's thread."""
+        self._declared.append(self._session.declare_subscriber(key, lambda sample: take(bytes(sample.payload))))
+
+    def live(self, key: str) -> None:
+        """Declare a token, which is gone when this end is."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def watch(self, key: str, changed: Callable[[bool], None]) -> None:
+        """Call ``changed``, in Zenoh's thread, when the token ``key`` appears (True) or is gone (False)."""
+        put = self._zenoh.SampleKind.PUT
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(key, lambda one: changed(one.kind == put), history=True)
+        )
+
+    # The lead's.
+
+    def answer(self, join: Callable[[Any], Any], clock: Callable[[], int]) -> None:
+        """Answer those who want to join, and those who compare clocks, in Zenoh's thread."""
+
+        def answer_join(query: Any) -> None:
+            try:
+                reply = join(decode(bytes(query.payload)))
+            except MessageError:
+                self.refused += 1
+                return
+            query.reply(_JOIN, encode(reply))
+
+        self._declared += [
+            self._session.declare_queryable(_JOIN, answer_join),
+            self._session.declare_queryable(_CLOCK, lambda query: query.reply(_CLOCK, str(clock()).encode())),
+        ]
+        self.live(_LEAD_ALIVE)
+
+    # A node's.
+
+    def ask_to_join(self, message: Any, seconds: float) -> Any:
+        """Return the lead's answer, or None if it gives none within ``seconds``."""
+        for reply in self._session.get(_JOIN, payload=encode(message), timeout=seconds):
+            if reply.ok is not None:
+                return decode(bytes(reply.ok.payload))
+        return None
+
+    def ask_clock(self, seconds: float) -> int | None:
+        """Return the lead's Unix time, ns, or None if it gives no answer within ``seconds``."""
+        for reply in self._session.get(_CLOCK, timeout=seconds):
+            if reply.ok is not None:
+                return int(bytes(reply.ok.payload))
+        return None
+
+    def watch_lead(self, changed: Callable[[bool], None]) -> None:
+        """As `watch`, for the lead."""
+        self.watch(_LEAD_ALIVE, changed)
+
+    def close(self) -> None:
+        """Leave."""
+        for declared in self._declared:
+            declared.undeclare()
+        self._session.close()
+        self._bell.close()
