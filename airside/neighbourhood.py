@@ -56,7 +56,7 @@ class Neighbourhood:
             sources, targets = (linked, linked) if setting.lockstep else (senders, receivers)
             far = [peer for peer in linked if setting.is_far(peer)]
             self._mesh = Mesh(
-                setting.swarm, me, sources, targets, listen, connect, setting.lockstep, setting.patience, far
+                setting.swarm, me, sources, targets, listen, connect, setting.lockstep, setting.link_timeout, far
             )
         self._own = specs[0].uav
         self._traffic = self._mesh.traffic if self._mesh else {}

@@ -52,7 +52,7 @@ class Mesh:
     listen : endpoint of this peer, such as "tcp/127.0.0.1:20008", or None if nobody connects to it.
     connect : endpoints of the peers to connect to.
     ordered : deliver every transmission in order (lockstep) instead of the newest ones (real time).
-    patience : wall time after which a link over which nothing comes counts as broken, s.
+    timeout : wall time after which a link over which nothing comes counts as broken, s.
     far : names of processes on other computers, whose traffic is measured.
     security : further settings of Zenoh, see `mesh_security`; empty: links are not encrypted.
     """
@@ -66,7 +66,7 @@ class Mesh:
         listen: str | None,
         connect: Iterable[str],
         ordered: bool,
-        patience: float = 1.0,
+        timeout: float = 1.0,
         far: Iterable[int] = (),
         security: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
@@ -89,7 +89,7 @@ class Mesh:
         self.traffic = {sender: Traffic() for sender in hears if sender in far}
         """By sender on another computer: what the network does to its transmissions."""
         self._dated = bool(far)
-        self._session = zenoh.open(configuration(zenoh, listen, connect, patience, security))
+        self._session = zenoh.open(configuration(zenoh, listen, connect, timeout, security))
         self._subscribers = [
             self._session.declare_subscriber(
                 f"{prefix}/{sender}/shared", self._keeper(sender), allowed_origin=zenoh.Locality.REMOTE
@@ -173,7 +173,7 @@ class Mesh:
 
 
 def configuration(
-    zenoh: Any, listen: str | None, connect: Iterable[str], patience: float, security: Mapping[str, Any]
+    zenoh: Any, listen: str | None, connect: Iterable[str], timeout: float, security: Mapping[str, Any]
 ) -> Any:
     """Zenoh's configuration of a peer that speaks by the given endpoints alone; parameters as of `Mesh`."""
     settings: Mapping[str, Any] = {
@@ -187,8 +187,8 @@ def configuration(
         "transport": {
             "link": {
                 "tx": {
-                    "lease": round(1000.0 * patience),
-                    "queue": {"congestion_control": {"block": {"wait_before_close": round(1e6 * max(patience, 5.0))}}},
+                    "lease": round(1000.0 * timeout),
+                    "queue": {"congestion_control": {"block": {"wait_before_close": round(1e6 * max(timeout, 5.0))}}},
                 }
             },
             "shared_memory": {"enabled": False},
@@ -202,6 +202,7 @@ def merged(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, An
     result = dict(settings)
     for name, value in more.items():
         before = result.get(name)
-        both = isinstance(before, Mapping) and isinstance(value, Mapping)
-        result[name] = merged(before, value) if both else value
+        if isinstance(before, Mapping) and isinstance(value, Mapping):
+            value = merged(before, value)
+        result[name] = value
     return result

@@ -69,7 +69,7 @@ class Setting:
     """Name of the computer on which the process runs; "" where all do."""
     peers: Mapping[int, MeshPlace] = field(default_factory=dict)
     """By the first UAV of each autopilot process, where its mesh is, if the swarm flies on several computers."""
-    patience: float = 1.0
+    link_timeout: float = 1.0
     """Wall time after which a mesh link over which nothing comes counts as broken, s."""
     tls: Path | None = None
     """Folder of keys: with it the mesh is encrypted, and speaks only to those who belong to it."""

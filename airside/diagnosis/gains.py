@@ -30,7 +30,7 @@ class DiagnosisGains(NamedTuple):
     determined: Annotated[float, Q("determined", "-", "deviation below which effectiveness is determined", 0.1)]
     lasting: Annotated[float, Q("lasting", "s", "time that a navigation fault excuses alarms", 1.0)]
     slip: Annotated[float, Q("slip", "rad/s", "mismatch of attitude and body rates of a navigation fault", 0.08)]
-    patience: Annotated[float, Q("patience", "s", "time after which an alarm without a fault is taken back", 6.0)]
+    timeout: Annotated[float, Q("timeout", "s", "time after which an alarm without a fault is taken back", 6.0)]
     pace: Annotated[float, Q("pace", "1/s", "fastest change of the effectiveness that the law is told", 2.0)]
     least: Annotated[float, Q("least", "-", "least effectiveness that the law is told", 0.2)]
     dither: Annotated[float, Q("dither", "-", "amplitude of the excitation, share of the travel; 0: none", 0.0)]
@@ -69,7 +69,7 @@ _BY_ACTUATOR = ["thrust", "elevator", "aileron", "rudder", "load_factor", "bank"
 
 DIAGNOSIS_RANGES = {
     ranges.FREQUENCY: "bandwidth dither_frequency",
-    ranges.FILTER_TIME: "memory lasting patience fresh silent leaving returning fading",
+    ranges.FILTER_TIME: "memory lasting timeout fresh silent leaving returning fading",
     ranges.LIMIT: " ".join(
         [
             "sd_speed sd_angle sd_rate sd_coefficient sd_effectiveness determined slip pace",

@@ -196,7 +196,7 @@ def try_actuator(d, i, slot, gains, thresholds, moved, worthless, excused, now, 
             state, kind = FAULTY, found
             isolated_at = now if math.isnan(isolated_at) else isolated_at
         nothing = found == NO_KIND and abs(loss * position + bias) < 0.5 * drift and abs(loss) < 0.1
-        if nothing and now - max(detected_at, candidate_since) > gains.patience:
+        if nothing and now - max(detected_at, candidate_since) > gains.timeout:
             state, kind = HEALTHY, NO_KIND
             detected_at, suspected_at, isolated_at = math.nan, math.nan, math.nan
             _forget_effectiveness(x, P, gains)

@@ -166,8 +166,6 @@ def _gathered(
     plan: NodesPlan, ssh: bool, mission: Mission, options: FlightOptions, ports: PortBlock, json: bool
 ) -> Nodes:
     """Wait until all other computers are there."""
-    from multiprocessing.connection import wait
-
     from ftcc.groundside.nodes import Nodes
 
     gathered = Nodes(
@@ -189,7 +187,7 @@ def _gathered(
     try:
         if ssh:
             gathered.start_by_ssh()
-        gathered.gather(say, lambda descriptor: wait([descriptor], _LOOK))
+        gathered.gather(say, _LOOK)
     except BaseException:
         gathered.close()
         ports.release()

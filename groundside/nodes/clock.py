@@ -49,7 +49,7 @@ def with_unix(message: object) -> object:
 
 
 def with_monotonic(message: object, offset: float) -> object:
-    """Return a message from another computer, whose clock is ``offset`` s ahead, with its instant by this monotonic clock."""
+    """Return a message from a computer whose clock is ``offset`` s ahead, with its instant by this monotonic clock."""
     return _shifted(message, time.monotonic() - time.time() - offset)
 
 

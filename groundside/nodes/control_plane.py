@@ -63,14 +63,14 @@ class ControlPlane:
     Parameters
     ----------
     listen, connect : endpoints of Zenoh, such as "tls/10.0.0.1:7447"; the lead listens, a node connects.
-    patience : silence after which a link counts as broken, wall s.
+    timeout : silence after which a link counts as broken, wall s.
     security : see `Mesh`.
     """
 
-    def __init__(self, listen: str | None, connect: str | None, patience: float, security: Mapping[str, Any]) -> None:
+    def __init__(self, listen: str | None, connect: str | None, timeout: float, security: Mapping[str, Any]) -> None:
         self._zenoh = import_zenoh()
         connects = [connect] if connect else []
-        self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, patience, security))
+        self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, security))
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
         self._declared: list[Any] = []

@@ -6,6 +6,7 @@ import dataclasses
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -145,7 +146,7 @@ class Nodes:
         address, port = resolve(plan.listen)
         self._address = address
         self.endpoint = f"{'tls' if tls else 'tcp'}/{f'[{address}]' if ':' in address else address}:{port}"
-        self._control = ControlPlane(self.endpoint, None, plan.patience, security or {})
+        self._control = ControlPlane(self.endpoint, None, plan.timeout, security or {})
         for name, node in self._nodes.items():
             self._control.listen_for_messages(from_node(name, "message"), name)
             self._control.listen_for_bytes(from_node(name, "file"), self._file_taker(node))
@@ -183,8 +184,8 @@ class Nodes:
                 except OSError as error:
                     raise NodesError(f"--ssh: ssh cannot be started: {error.strerror}") from None
 
-    def gather(self, report: Callable[[str], None], wait: Callable[[int], None]) -> None:
-        """Wait until all nodes have joined and hold their ports, calling ``wait`` with a descriptor in between.
+    def gather(self, report: Callable[[str], None], period: float) -> None:
+        """Wait until all nodes have joined and hold their ports; Ctrl-C is noticed every ``period`` s.
 
         Raises
         ------
@@ -195,7 +196,7 @@ class Nodes:
         for name in self._nodes:
             report(f"waiting for node {name}: ftcc node --join {self.plan.listen} --name {name} {secure}")
         while any(node.placed is None for node in self._nodes.values()):
-            wait(self._control.fileno())
+            wait([self._control.fileno()], period)
             for name, what in self._control.take():
                 node = self._nodes[name]
                 match what:
@@ -262,7 +263,7 @@ class Nodes:
     # The processes there.
 
     @property
-    def children(self) -> list[Child]:
+    def children(self) -> Sequence[Child]:
         """Return the processes on all nodes."""
         return [child for node in self._nodes.values() for child in node.children.values()]
 
@@ -278,16 +279,7 @@ class Nodes:
             own = tuple(part for part in parts if self._flown_at(part) == name)
             send = self._sender(name)
             node.children = {part.name: _RemoteChild(part, send) for part in own}
-            flown = {str(uav) for uav in (*node.vehicles, *node.autopilots)}
-            names = set(node.children)
-            node.receiver = Receiver(
-                self._folder,
-                lambda file, flown=flown, names=names: (  # type: ignore[misc]
-                    file.removesuffix(".log") in names
-                    if file.endswith(".log")
-                    else file.split("-")[0].lstrip("0") in flown
-                ),
-            )
+            node.receiver = Receiver(self._folder, _files_of(node))
             node.relay = self._relay_to(node, setting)
             self._control.send(
                 for_node(name, "message"),
@@ -297,18 +289,18 @@ class Nodes:
                     lockstep=setting.lockstep,
                     peer_of=setting.peer_of,
                     peers=places,
-                    patience=self._mesh_patience,
+                    link_timeout=self._mesh_timeout,
                     listeners=setting.listeners,
                     id_offset=setting.id_offset,
                     epoch_us=setting.epoch_us,
                 ),
             )
-        return dataclasses.replace(setting, peers=places, patience=self._mesh_patience)
+        return dataclasses.replace(setting, peers=places, link_timeout=self._mesh_timeout)
 
     @property
-    def _mesh_patience(self) -> float:
+    def _mesh_timeout(self) -> float:
         """In lockstep nothing may be lost while a link is down; on the wall clock a new link serves sooner."""
-        return self.plan.patience if self._lockstep else min(2.0, self.plan.patience)
+        return self.plan.timeout if self._lockstep else min(2.0, self.plan.timeout)
 
     def _flown_at(self, part: Part) -> str:
         return self.place(part.uavs[0])[0 if part.kind == "vehicle" else 1]
@@ -328,7 +320,7 @@ class Nodes:
         return send
 
     def _relay_to(self, node: _Node, setting: Setting) -> Relay:
-        """Carry datagrams between this computer and a node: telemetry, commands, and MAVLink of pairs that are split."""
+        """Carry datagrams to and from a node: telemetry, commands, and MAVLink of pairs that are split."""
         name, ours, theirs = node.name, self._ports, node.block
         relay = Relay(lambda data: self._control.send_bytes(for_node(name, "datagram"), data, droppable=True))
         telemetry = {theirs.of(uav).telemetry: ours.of(uav).telemetry for uav in node.autopilots}
@@ -407,19 +399,19 @@ class Nodes:
 
     # After the flight.
 
-    def collect(self, wait: Callable[[], None]) -> None:
+    def collect(self, poll: Callable[[], None]) -> None:
         """Wait until the recordings of all nodes that are there have come, as long as something comes."""
         progress, since = -1, time.monotonic()
         while waited := [node for node in self._nodes.values() if not (node.gone or node.delivered)]:
             received = sum(node.receiver.octets for node in waited if node.receiver)
             if received != progress:
                 progress, since = received, time.monotonic()
-            if time.monotonic() - since > self.plan.patience:
+            if time.monotonic() - since > self.plan.timeout:
                 names = ", ".join(node.name for node in waited)
                 self._control.keep(waited[0].name, FileError(f"recordings of {names} did not come home"))
-                wait()
+                poll()
                 return
-            wait()
+            poll()
 
     def release(self) -> None:
         """Wait until the nodes, whose processes are released, have left; leave, too."""
@@ -438,10 +430,21 @@ class Nodes:
         self._control.close()
         for node in self._nodes.values():
             if node.ssh is not None:
-                with_ended = node.ssh.poll() is not None
-                if not with_ended:
+                if node.ssh.poll() is None:
                     node.ssh.terminate()
                 node.ssh.wait()
+
+
+def _files_of(node: _Node) -> Callable[[str], bool]:
+    """Return which files may come home from a node: the logs of its processes, and the parts of its UAVs."""
+    uavs = {str(uav) for uav in (*node.vehicles, *node.autopilots)}
+
+    def allowed(file: str) -> bool:
+        if file.endswith(".log"):
+            return file.removesuffix(".log") in node.children
+        return file.partition("-")[0] in uavs
+
+    return allowed
 
 
 def _flown(node: _Node) -> str:

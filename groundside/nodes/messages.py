@@ -112,7 +112,7 @@ class Start:
     lockstep: bool
     peer_of: dict[int, int]
     peers: dict[int, MeshPlace]
-    patience: float
+    link_timeout: float
     listeners: tuple[tuple[str, int], ...]
     id_offset: int
     epoch_us: int

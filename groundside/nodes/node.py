@@ -69,7 +69,7 @@ class NodeOptions:
     """Folder of keys; None: nothing is encrypted."""
     key: Path | None = None
     """Key file for signed MAVLink messages to the ground."""
-    patience: float = 30.0
+    timeout: float = 30.0
 
 
 def run_node(
@@ -98,7 +98,7 @@ def run_node(
         host, port = options.lead
         shown = f"[{host}]" if ":" in host else host
         endpoint = f"{'tls' if options.tls else 'tcp'}/{shown}:{port}"
-        control = ControlPlane(None, endpoint, options.patience, security)
+        control = ControlPlane(None, endpoint, options.timeout, security)
         stack.callback(control.close)
         say(f"node {options.name}: waiting for the swarm at {shown}:{port}")
         control.listen_for_messages(for_node(options.name, "message"), "lead")
@@ -264,7 +264,7 @@ class _Node:
             epoch_us=start.epoch_us,
             computer=self.options.name,
             peers=start.peers,
-            patience=start.patience,
+            link_timeout=start.link_timeout,
             tls=self.options.tls,
         )
         return relay, setting

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 
 from ftcc.groundside.errors import UserError
-from ftcc.groundside.schema.base import Strict
+from ftcc.groundside.schema import Strict
 from ftcc.groundside.text import ids, ids_of
 from ftcc.link.addresses import AddressError, resolve
 
@@ -68,7 +68,7 @@ class NodesPlan(Strict):
     listen: Annotated[str, AfterValidator(_resolvable)] = Field(
         description="HOST:PORT at which the nodes reach the leading computer"
     )
-    patience: float = Field(30.0, ge=2.0, le=3600.0, description="s, silence after which a computer counts as gone")
+    timeout: float = Field(30.0, ge=2.0, le=3600.0, description="s, silence after which a computer counts as gone")
     largest_offset: float = Field(
         0.01, gt=0.0, le=1.0, description="s, between the clocks of two computers, with --clock wall"
     )

@@ -55,16 +55,22 @@ def grouped(uavs: Sequence[int], pack: int, place: Callable[[int], Any] = lambda
 class Elsewhere(Protocol):
     """The processes of a swarm that run on other computers."""
 
-    children: Sequence[Child]
-    start_delay: float
-    """Wall time that a pace needs to reach them, s."""
+    @property
+    def children(self) -> Sequence[Child]:
+        """Return the processes there."""
+        ...
+
+    @property
+    def start_delay(self) -> float:
+        """Return the wall time that a pace needs to reach them, s."""
+        ...
 
     def place(self, uav: int) -> tuple[str, str]:
         """Return where the vehicle and the autopilot of a UAV fly; "" stands for this computer."""
         ...
 
     def start(self, setting: Setting, parts: Sequence[Part]) -> Setting:
-        """Start ``parts`` there; return the setting of this computer's processes, which now know where the others are."""
+        """Start ``parts`` there; return the setting of the processes here, which now know where the others are."""
         ...
 
     def fileno(self) -> int:
@@ -75,8 +81,8 @@ class Elsewhere(Protocol):
         """Return what has come: messages of the gate and `Exited`, each with its process."""
         ...
 
-    def collect(self, wait: Callable[[], None]) -> None:
-        """Bring the parts of the recording home, calling ``wait`` while they come."""
+    def collect(self, poll: Callable[[], None]) -> None:
+        """Bring the parts of the recording home, calling ``poll`` while they come."""
         ...
 
     def release(self) -> None:
@@ -190,8 +196,9 @@ class SwarmProcesses:
             setting = elsewhere.start(setting, [part for part in self._parts if self._flies_elsewhere(part)])
         self._here = LocalProcesses(mission, setting)
         self._selector = selectors.DefaultSelector()
-        for source in (self._here, *([elsewhere] if elsewhere else [])):
-            self._selector.register(source, selectors.EVENT_READ)
+        self._selector.register(self._here, selectors.EVENT_READ)
+        if elsewhere:
+            self._selector.register(elsewhere, selectors.EVENT_READ)
 
     def _flies_elsewhere(self, part: Part) -> bool:
         """Return whether a part is placed on another computer."""
@@ -305,10 +312,10 @@ class SwarmProcesses:
                 for uav in child.uavs:
                     other.send(Gone(uav))
 
-    def collect(self, wait: Callable[[], None]) -> None:
-        """Bring home what was recorded on other computers, calling ``wait`` meanwhile; all processes have ended."""
+    def collect(self, poll: Callable[[], None]) -> None:
+        """Bring home what was recorded on other computers, calling ``poll`` meanwhile; all processes have ended."""
         if self._elsewhere:
-            self._elsewhere.collect(wait)
+            self._elsewhere.collect(poll)
 
     def release(self) -> None:
         """Release the processes, which have all ended their flight, and wait until they exit."""
