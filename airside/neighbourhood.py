@@ -121,9 +121,9 @@ class Neighbourhood:
         if sender in self._acknowledged:
             self._acknowledged[sender] = header.heard
 
-    def report_network(self, now_us: int) -> None:
-        """Report once a second, wall time, how the network serves the links with other computers."""
-        if self._traffic and time.monotonic() - self._reported >= _NETWORK_PERIOD:
+    def report_network(self, now_us: int, last: bool = False) -> None:
+        """Report once a second, wall time, and at the end how the network serves the links with other computers."""
+        if self._traffic and (last or time.monotonic() - self._reported >= _NETWORK_PERIOD):
             self._reported = time.monotonic()
             for sender, traffic in self._traffic.items():
                 self._gate.report(NetworkReport(self._own, sender, now_us, *traffic.report()))

@@ -236,7 +236,7 @@ class AutopilotProcess:
                 link.attend()
             self.write_if_held()
             self.warn_if_stalled()
-            self.neighbourhood.report_network(max(0, int(self.group.done.max())) * self.timing.period_us)
+            self.neighbourhood.report_network(self.now_us)
 
     def write_if_held(self) -> None:
         """Write what has been recorded when the swarm is held, for who looks now."""
@@ -278,12 +278,18 @@ class AutopilotProcess:
                 self.send_telemetry_soon()
 
     @property
+    def now_us(self) -> int:
+        """Simulated time of the last tick that any of them flew, us."""
+        return max(0, int(self.group.done.max())) * self.timing.period_us
+
+    @property
     def names(self) -> str:
         return ", ".join(str(spec.uav) for spec in self.specs)
 
     def end(self) -> None:
         """Release all who wait for this process, write what it has recorded, and wait until all have ended."""
         self.group.alive[:] = 0
+        self.neighbourhood.report_network(self.now_us, last=True)
         self.neighbourhood.end()
         for link in self.gcs_links:
             link.end()

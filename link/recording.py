@@ -19,6 +19,7 @@ from ftcc.link.compiled import compiled
 __all__ = [
     "AIRCRAFT_LOST",
     "LINK_COLUMNS",
+    "NETWORK_FILE",
     "ROWS",
     "SCHEMA_VERSION",
     "Column",
@@ -45,6 +46,8 @@ _SPARE = 256
 _FLUSH = 0.9
 """Wall time after which rows are written although there is room for more, s."""
 
+NETWORK_FILE = "network.jsonl"
+"""Of a run on several computers: what the network between them did to the mesh, a JSON object a line."""
 AIRCRAFT_LOST = "aircraft lost: "
 """How the text of an event begins that reports why a UAV was lost."""
 
@@ -265,14 +268,17 @@ class EventLog:
 
 def read_events(path: Path) -> list[dict[str, Any]]:
     """The events of a log in order of simulated time; an incomplete last line is left out."""
-    events = []
-    if not Path(path).exists():
-        return []
+    return read_lines(path) if Path(path).exists() else []
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The objects of a file with a JSON object a line, in order of their ``t``; an incomplete last line is left out."""
+    found = []
     for line in Path(path).read_text(encoding="utf-8").splitlines():
         try:
-            event = json.loads(line)
+            one = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if "t" in event:
-            events.append(event)
-    return sorted(events, key=lambda event: float(event["t"]))
+        if "t" in one:
+            found.append(one)
+    return sorted(found, key=lambda one: float(one["t"]))

@@ -13,7 +13,7 @@ class Traffic:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._last = time.monotonic()
+        self._last: float | None = None
         self._number = -1
         self._clear()
 
@@ -28,7 +28,7 @@ class Traffic:
             self._received += 1
             self._delays += delay
             self._longest = max(self._longest, delay)
-            self._silence = max(self._silence, now - self._last)
+            self._silence = max(self._silence, now - (now if self._last is None else self._last))
             self._last = now
 
     def numbered(self, number: int) -> None:
@@ -38,17 +38,11 @@ class Traffic:
                 self._missing += max(0, number - self._number - 1)
             self._number = max(self._number, number)
 
-    @property
-    def silent(self) -> float:
-        """Wall time since the last transmission, s."""
-        with self._lock:
-            return time.monotonic() - self._last
-
     def report(self) -> tuple[int, int, float, float, float]:
         """Received and missing transmissions, mean and longest delay (s), longest silence (s); begins anew."""
         with self._lock:
             mean = self._delays / self._received if self._received else 0.0
-            silence = max(self._silence, time.monotonic() - self._last)
+            silence = max(self._silence, 0.0 if self._last is None else time.monotonic() - self._last)
             found = (self._received, self._missing, mean, self._longest, silence)
             self._clear()
             return found

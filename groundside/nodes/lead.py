@@ -368,7 +368,7 @@ class Nodes:
         if node.gone or not self._started:
             return []
         node.gone = True
-        left = f"what its processes recorded stays there, as run {self._folder.name}"
+        left = f"what its processes recorded stays there: {node.placed.folder}" if node.placed else ""
         exits = [(child, Exited(None, why=text)) for child in node.children.values() if not child.dead]
         return [(None, EventReport("error", f"{text}; {left}")), *exits]
 

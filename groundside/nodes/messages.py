@@ -95,6 +95,8 @@ class Welcome:
 class Placed:
     """Node -> lead: the scenario is read, ports are held."""
 
+    folder: str
+    """Where its run is, as "computer:folder"."""
     port: int
     """First port of its block."""
     offset: float
@@ -135,8 +137,6 @@ class Delivered:
     """Node -> lead: all that its processes recorded has been sent."""
 
     files: int
-    folder: str
-    """Where it lies on the node, too."""
 
 
 _GATE = (Ended, EventReport, Go, Gone, Held, LawFailed, Limit, Lost, NetworkReport, Pace, Ready, Release, Stop)

@@ -193,7 +193,7 @@ class _Node:
         if offset is None:
             raise NodesError("the leading computer does not answer any more")
         self.offset = offset
-        self.send(Placed(self.block.base, *offset))
+        self.send(Placed(f"{socket.gethostname()}:{self.folder.resolve()}", self.block.base, *offset))
         self.say(f"node {self.options.name}: joined {self.welcome.run}; clock of the leading computer {offset}")
 
     def wait_for_start(self) -> Start | None:
@@ -335,4 +335,4 @@ class _Node:
         for path in files:
             for piece in pieces(self.folder, path):
                 self.control.send_bytes(from_node(self.options.name, "file"), piece, droppable=False)
-        self.send(Delivered(len(files), str(self.folder)))
+        self.send(Delivered(len(files)))

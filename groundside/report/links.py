@@ -15,7 +15,11 @@ from ftcc.groundside.report.plates import Plates
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["links_section"]
+__all__ = ["links_section", "network_section"]
+
+
+_SILENT = 1.0
+"""Wall time without a transmission that is marked, s."""
 
 
 def links_section(links: dict[str, Any], mission: Mission, plates: Plates) -> Section:
@@ -33,9 +37,40 @@ def links_section(links: dict[str, Any], mission: Mission, plates: Plates) -> Se
     end = float(links["t"].max())
     before = [
         f"Counted by the receivers until {end:g} s. Lost: dropped by the emulated channel, including cuts. Not "
-        "delivered: missing in the mesh itself, which happens only on an overloaded computer."
+        "delivered: missing in the mesh itself, which happens only on an overloaded computer or, on the wall clock, "
+        "where the network between computers fails."
     ]
     return Section("links", "Links", before, svg=_ages(links, mission, plates), heads=heads, rows=rows)
+
+
+def network_section(network: list[dict[str, Any]]) -> Section:
+    """Return a table of what the network between computers did to each link of the mesh."""
+    heads = [Head("from"), Head("to"), Head("transmissions", True), Head("missing", True), Head("mean delay, ms", True)]
+    heads += [Head("longest delay, ms", True), Head("longest silence, s", True), Head("at, s", True)]
+    before = [
+        "The real network, in wall time; the emulated radio is counted under Links, in simulated time. A process is "
+        "named by its first UAV. Delays compare the clocks of two computers. In lockstep the flight waits for the "
+        "network, so nothing here changes what was flown; on the wall clock neighbours age."
+    ]
+    rows = []
+    for sender, receiver in sorted({(one["sender"], one["receiver"]) for one in network}):
+        of_link = [one for one in network if (one["sender"], one["receiver"]) == (sender, receiver)]
+        received, missing = (sum(one[name] for one in of_link) for name in ("received", "missing"))
+        delays = sum(one["delay"] * one["received"] for one in of_link)
+        silence = max(of_link, key=lambda one: float(one["silence"]))
+        rows.append(
+            [
+                Cell(f"UAV {sender}"),
+                Cell(f"UAV {receiver}"),
+                Cell(str(received)),
+                Cell(str(missing), "warning" if missing else ""),
+                Cell(f"{1e3 * delays / received:.2f}" if received else ""),
+                Cell(f"{1e3 * max(one['longest_delay'] for one in of_link):.1f}"),
+                Cell(f"{silence['silence']:.2f}", "warning" if silence["silence"] > _SILENT else ""),
+                Cell(f"{silence['t']:g}"),
+            ]
+        )
+    return Section("network", "Network between computers", before, heads=heads, rows=rows)
 
 
 def _row(receiver: int, sender: int, edge: dict[str, Any]) -> list[Cell]:

@@ -17,7 +17,16 @@ from ftcc.groundside.results.column_reader import ColumnReader
 from ftcc.groundside.results.folders import RunError
 from ftcc.groundside.results.merging import merge_run, up_to_date_table
 from ftcc.groundside.results.recording import Recording
-from ftcc.link.recording import AIRCRAFT_LOST, LINK_COLUMNS, Column, arrow_schema, read_events, read_part
+from ftcc.link.recording import (
+    AIRCRAFT_LOST,
+    LINK_COLUMNS,
+    NETWORK_FILE,
+    Column,
+    arrow_schema,
+    read_events,
+    read_lines,
+    read_part,
+)
 
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission, Scenario
@@ -157,6 +166,15 @@ class Run(Recording):
             If no process wrote anything: `NothingRecordedError`.
         """
         return merge_run(self.path)
+
+    @functools.cached_property
+    def network(self) -> list[dict[str, Any]]:
+        """What the network between computers did to the mesh, about a row per link and second of wall time.
+
+        Empty where all processes ran on one computer. See `ftcc.link.gate.NetworkReport`.
+        """
+        path = self.path / NETWORK_FILE
+        return read_lines(path) if path.is_file() else []
 
     @functools.cached_property
     def links(self) -> dict[str, NDArray[Any]]:

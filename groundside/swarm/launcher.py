@@ -21,7 +21,7 @@ from ftcc.groundside.swarm.network_log import NetworkLog
 from ftcc.link.gate import Ended, EventReport, Go, Gone, Held, LawFailed, Lost, NetworkReport, Ready, Release, Stop
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import Setting
-from ftcc.link.recording import AIRCRAFT_LOST
+from ftcc.link.recording import AIRCRAFT_LOST, NETWORK_FILE
 
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
@@ -161,6 +161,7 @@ class SwarmProcesses:
         self.on_event = on_event
         self.outcome = Outcome()
         self._network = NetworkLog(folder)
+        self._network_trouble = ""
         self.children: list[Child] = []
         self.stopping_since: float | None = None
         self._elsewhere = elsewhere
@@ -273,7 +274,7 @@ class SwarmProcesses:
             case EventReport(severity, text, uav, at_us, who, outcome):
                 self.on_event(Event(-1.0 if at_us is None else at_us / 1e6, severity, text, uav, who, outcome))
             case NetworkReport():
-                self._network.write(message)
+                self._log_network(message)
             case _ if child is None:
                 raise ValueError(f"{message} belongs to a process")
             case Ready():
@@ -296,6 +297,14 @@ class SwarmProcesses:
                     self.outcome.law_error = text
                     self.on_event(Event(at_us / 1e6, "error", text))
                 self.stop()
+
+    def _log_network(self, report: NetworkReport) -> None:
+        try:
+            self._network.write(report)
+        except OSError as error:
+            if not self._network_trouble:
+                self._network_trouble = f"{NETWORK_FILE} is not written any further: {error.strerror or error}"
+                self.on_event(Event(-1.0, "error", self._network_trouble))
 
     def _handle_exit(self, child: Child, exited: Exited) -> None:
         """Handle the end of a process: if unexpected, report it, stop its partner, and make no other wait for it."""
@@ -320,6 +329,7 @@ class SwarmProcesses:
     def release(self) -> None:
         """Release the processes, which have all ended their flight, and wait until they exit."""
         self._selector.close()
+        self._network.close()
         self.send_to_all(Release())
         self._here.release()
         if self._elsewhere:

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import TextIO
 
 from ftcc.link.gate import NetworkReport
+from ftcc.link.recording import NETWORK_FILE
 
-__all__ = ["NETWORK_FILE", "NetworkLog"]
-
-NETWORK_FILE = "network.jsonl"
+__all__ = ["NetworkLog"]
 
 
 class NetworkLog:
@@ -24,18 +23,19 @@ class NetworkLog:
     def __init__(self, folder: Path) -> None:
         self._path = folder / NETWORK_FILE
         self._file: TextIO | None = None
-        self.trouble = ""
-        """Why reports could not be written; empty where all are."""
 
     def write(self, report: NetworkReport) -> None:
-        """Append a report."""
-        try:
-            if self._file is None:
-                self._file = self._path.open("a", encoding="utf-8", buffering=1)
-            line = {"t": report.at_us / 1e6, "wall": round(time.time(), 3), **dataclasses.asdict(report)}
-            self._file.write(json.dumps(line, allow_nan=False) + "\n")
-        except OSError as error:
-            self.trouble = error.strerror or str(error)
+        """Append a report.
+
+        Raises
+        ------
+        OSError
+            If that is not possible.
+        """
+        if self._file is None:
+            self._file = self._path.open("a", encoding="utf-8", buffering=1)
+        line = {"t": report.at_us / 1e6, "wall": round(time.time(), 3), **dataclasses.asdict(report)}
+        self._file.write(json.dumps(line, allow_nan=False) + "\n")
 
     def close(self) -> None:
         """Close the file."""
