@@ -244,14 +244,9 @@ class Nodes:
         elif join.secured != (self._tls is not None):
             why = "of the two computers one has --tls and the other --insecure"
         else:
-            for what, asked, planned in (
-                ("vehicles", join.vehicles, node.vehicles),
-                ("autopilots", join.autopilots, node.autopilots),
-            ):
-                if asked is not None and tuple(asked) != planned:
-                    why = (
-                        f"it is to fly the {what} {ids(asked) or 'none'}, in the plan it flies {ids(planned) or 'none'}"
-                    )
+            why = _difference("vehicles", join.vehicles, node.vehicles) or _difference(
+                "autopilots", join.autopilots, node.autopilots
+            )
         if why:
             return Refused(why)
         assert node is not None
@@ -445,6 +440,13 @@ def _files_of(node: _Node) -> Callable[[str], bool]:
         return file.partition("-")[0] in uavs
 
     return allowed
+
+
+def _difference(what: str, asked: tuple[int, ...] | None, planned: tuple[int, ...]) -> str:
+    """Return how what a node is to fly differs from the plan; "" if it does not."""
+    if asked is None or asked == planned:
+        return ""
+    return f"it is to fly {what} {ids(asked) or 'none'}, the plan has {ids(planned) or 'none'} there"
 
 
 def _flown(node: _Node) -> str:

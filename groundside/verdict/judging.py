@@ -140,7 +140,8 @@ def _losses(flight: _Flight) -> Iterator[Loss]:
         if uav in flight.lost:
             yield Loss(uav, *flight.lost[uav])
         elif flight.end > 0.0 and not flight.lasted(uav):
-            yield Loss(uav, flight.until.get(uav, 0.0), "its recording ends")
+            why = "its recording ends" if uav in flight.until else "it has no recording"
+            yield Loss(uav, flight.until.get(uav, 0.0), why)
 
 
 def _tracking(flight: _Flight) -> Iterator[TrackingError]:
