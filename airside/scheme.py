@@ -36,6 +36,7 @@ __all__ = [
     "Scheme",
     "SchemeError",
     "quantities",
+    "rates_of",
 ]
 
 
@@ -50,7 +51,8 @@ class Quantity:
     ``published`` is the monograph's value of a gain, None where the monograph has none. ``bound`` names the signal
     (or gives the constant) that limits this one, for display. ``follows`` names what of the mission a gain follows
     unless it is given, see `FOLLOWED`. ``role`` is what a signal is to those who plot and judge it; None: as its
-    ``meaning`` says, see `shown_as`.
+    ``meaning`` says, see `shown_as`. ``rate_of`` names the quantity of which this one is the rate, among the values
+    that are shared with it, see `rates_of`.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Quantity:
     bound: float | str | None = None
     follows: str = ""
     role: Role | None = None
+    rate_of: str = ""
 
     @property
     def shown_as(self) -> Role:
@@ -145,6 +148,24 @@ def quantities(record: Any) -> Mapping[str, Quantity]:
     return MappingProxyType(found)
 
 
+def rates_of(shared: Sequence[Quantity]) -> tuple[int, ...]:
+    """For each of the values that are shared, the column of which it is the rate; -1: it is the rate of none.
+
+    Raises
+    ------
+    ValueError
+        For the rate of what is not shared, or of itself.
+    """
+    columns = {quantity.name: column for column, quantity in enumerate(shared)}
+    for quantity in shared:
+        if quantity.rate_of and (quantity.rate_of not in columns or quantity.rate_of == quantity.name):
+            raise ValueError(
+                f"{quantity.name} is called the rate of {quantity.rate_of!r}; shared beside it are "
+                f"{', '.join(name for name in columns if name != quantity.name) or 'no others'}"
+            )
+    return tuple(columns.get(quantity.rate_of, -1) for quantity in shared)
+
+
 _REQUIRED = ("Gains", "State", "Output", "SHARED", "GRAPH", "COMMANDS", "start", "step", "share")
 _DEFAULTS: dict[str, Any] = {
     "PLANT": "longitudinal",
@@ -184,6 +205,11 @@ class Scheme:
                 raise SchemeError(
                     f"scheme {self.name}: states or outputs hold vectors; say with SIGNALS what is recorded"
                 )
+        for role, shared in self.shared.items():
+            try:
+                rates_of(shared)
+            except ValueError as error:
+                raise SchemeError(f'scheme {self.name}: SHARED["{role}"]: {error}') from None
         if mistakes := find_mistakes(self.module, Heard):
             raise SchemeError("; ".join(mistakes))
 

@@ -25,14 +25,20 @@ Q = Quantity
 
 
 def _each(
-    axes: Sequence[tuple[str, str]], name: str, unit: str, meaning: str, bound: float | str | None
+    axes: Sequence[tuple[str, str]], name: str, unit: str, meaning: str, bound: float | str | None, rate_of: str = ""
 ) -> tuple[Quantity, ...]:
-    return tuple(Q(name.format(symbol), unit, meaning.format(axis), bound=bound) for symbol, axis in axes)
+    return tuple(
+        Q(name.format(symbol), unit, meaning.format(axis), bound=bound, rate_of=rate_of.format(symbol))
+        for symbol, axis in axes
+    )
 
 
-def angles(name: str, unit: str, meaning: str, bound: float | str | None = None) -> tuple[Quantity, ...]:
+def angles(
+    name: str, unit: str, meaning: str, bound: float | str | None = None, rate_of: str = ""
+) -> tuple[Quantity, ...]:
     """A quantity of each angle of attitude; {} in its name stands for the symbol, in its meaning for the word."""
-    return _each((("mu", "bank"), ("alpha", "angle of attack"), ("beta", "sideslip")), name, unit, meaning, bound)
+    axes = (("mu", "bank"), ("alpha", "angle of attack"), ("beta", "sideslip"))
+    return _each(axes, name, unit, meaning, bound, rate_of)
 
 
 def body_rates(name: str, unit: str, meaning: str, bound: float | str | None = None) -> tuple[Quantity, ...]:
@@ -45,9 +51,11 @@ def surfaces(name: str, unit: str, meaning: str, bound: float | str | None = Non
     return _each([(word, word) for word in ("aileron", "elevator", "rudder")], name, unit, meaning, bound)
 
 
-def space(name: str, unit: str, meaning: str = "", bound: float | str | None = None) -> tuple[Quantity, ...]:
+def space(
+    name: str, unit: str, meaning: str = "", bound: float | str | None = None, rate_of: str = ""
+) -> tuple[Quantity, ...]:
     """As `angles`, for the three directions of space."""
-    return _each((("x", "north"), ("y", "east"), ("z", "up")), name, unit, meaning, bound)
+    return _each((("x", "north"), ("y", "east"), ("z", "up")), name, unit, meaning, bound, rate_of)
 
 
 ATTITUDE_TRACKING = (
@@ -57,13 +65,17 @@ ATTITUDE_TRACKING = (
 )
 """Errors that a law of attitude must make small, with the size that counts as small."""
 
-ALTITUDE_MOTION = (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate"))
+ALTITUDE_MOTION = (Q("z", "m", "altitude"), Q("z_dot", "m/s", "climb rate", rate_of="z"))
 """Altitude as a leader shares it."""
-PLANE_MOTION = (Q("x", "m", "forward position"), Q("x_dot", "m/s", "forward speed"), *ALTITUDE_MOTION)
+PLANE_MOTION = (
+    Q("x", "m", "forward position"),
+    Q("x_dot", "m/s", "forward speed", rate_of="x"),
+    *ALTITUDE_MOTION,
+)
 """Motion in the vertical plane as a leader shares it."""
 ACCELERATED_MOTION = (
     Q("V", "m/s", "airspeed"),
-    Q("V_dot", "m/s^2", "acceleration; a follower's is modelled"),
+    Q("V_dot", "m/s^2", "acceleration; a follower's is modelled", rate_of="V"),
     *ALTITUDE_MOTION,
 )
 """Speed and altitude as neighbours share them."""

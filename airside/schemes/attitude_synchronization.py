@@ -202,7 +202,7 @@ class Output(NamedTuple):
 SHARED = {
     "follower": (
         *angles("{}_error", "rad", "tracking error, {}"),
-        *angles("{}_error_rate", "rad/s", "used without a neighbour filter only"),
+        *angles("{}_error_rate", "rad/s", "used without a neighbour filter only", rate_of="{}_error"),
     ),
     "leader": (),
 }

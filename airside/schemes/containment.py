@@ -130,8 +130,11 @@ class Output(NamedTuple):
 
 
 SHARED = {
-    "follower": (Q("zhat", "m", "estimated altitude reference"), Q("v", "m/s", "rate of the reference")),
-    "leader": (*ALTITUDE_MOTION, Q("V", "m/s"), Q("V_dot", "m/s^2")),
+    "follower": (
+        Q("zhat", "m", "estimated altitude reference"),
+        Q("v", "m/s", "rate of the reference", rate_of="zhat"),
+    ),
+    "leader": (*ALTITUDE_MOTION, Q("V", "m/s"), Q("V_dot", "m/s^2", rate_of="V")),
 }
 SIGNALS = (
     Q("zhat", "m", "estimated altitude reference"),

@@ -170,7 +170,7 @@ class Output(NamedTuple):
 SHARED = {
     "follower": (
         *angles("{}_error", "rad", "attitude error, {}"),
-        *angles("{}_error_rate", "rad/s", "its estimated rate"),
+        *angles("{}_error_rate", "rad/s", "its estimated rate", rate_of="{}_error"),
     ),
     "leader": (),
 }

@@ -134,9 +134,9 @@ class State(NamedTuple):
     """Internal states of one follower."""
 
     x_hat: Annotated[float, Q("x_hat", "m", "estimated position reference")]
-    Vx_hat: Annotated[float, Q("Vx_hat", "m/s", "its rate")]
+    Vx_hat: Annotated[float, Q("Vx_hat", "m/s", "its rate", rate_of="x_hat")]
     z_hat: Annotated[float, Q("z_hat", "m", "estimated altitude reference")]
-    Vz_hat: Annotated[float, Q("Vz_hat", "m/s", "its rate")]
+    Vz_hat: Annotated[float, Q("Vz_hat", "m/s", "its rate", rate_of="z_hat")]
     c11: Annotated[float, Q("chi11", "-", "adapted gain of the speed, network")]
     c12: Annotated[float, Q("chi12", "-", "adapted gain of the speed")]
     c21: Annotated[float, Q("chi21", "-", "adapted gain of the flight path, network")]

@@ -143,8 +143,8 @@ _POSITION_ERROR = space("Pt_{}", "m", "position error, {}")
 SHARED = {
     "follower": (
         *_POSITION_ERROR,
-        *space("Vt_{}", "m/s", "its rate, {}"),
-        *space("At_{}", "m/s^2", "commanded error acceleration, {}, for the monograph form"),
+        *space("Vt_{}", "m/s", "its rate, {}", rate_of="Pt_{}"),
+        *space("At_{}", "m/s^2", "commanded error acceleration, {}, for the monograph form", rate_of="Vt_{}"),
     )
 }
 _ERROR, _ERROR_RATE, _ERROR_ACCELERATION = 0, 3, 6

@@ -182,7 +182,10 @@ class Output(NamedTuple):
 
 
 SHARED = {
-    "follower": (Q("zhat", "m", "estimated altitude of the leader"), Q("v", "m/s", "rate of the reference")),
+    "follower": (
+        Q("zhat", "m", "estimated altitude of the leader"),
+        Q("v", "m/s", "rate of the reference", rate_of="zhat"),
+    ),
     "leader": ALTITUDE_MOTION,
 }
 _S = quantities(State)

@@ -14,7 +14,7 @@ import pytest
 import ftcc.airside.schemes
 from ftcc.airside import schemes
 from ftcc.airside.ranges import FEEDBACK
-from ftcc.airside.scheme import Quantity, Scheme, SchemeError, load, quantities
+from ftcc.airside.scheme import Quantity, Scheme, SchemeError, load, quantities, rates_of
 from ftcc.link.actuators import SLOT
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
 from ftcc.link.graph import Assumption
@@ -218,3 +218,23 @@ def test_a_declared_role_counts_more_than_words():
     assert Quantity("e", "m", "tracking error").shown_as == "error"
     assert Quantity("e", "m", "tracking error", role="plain").shown_as == "plain"
     assert Quantity("r", "rad/s^2", "what the control does not explain", role="estimate").shown_as == "estimate"
+
+
+@pytest.mark.parametrize("scheme", schemes.names())
+def test_of_what_neighbours_share_every_rate_is_known_as_one(scheme):
+    """By unit: m/s of m, rad/s of rad, m/s^2 of m/s; every scheme shares values with their rates beside them."""
+    for role, shared in schemes.find(scheme).shared.items():
+        for column, value in zip(rates_of(shared), shared, strict=True):
+            slower = shared[column].unit if column >= 0 else ""
+            assert (
+                value.unit in ({"m": "m/s", "rad": "rad/s", "m/s": "m/s^2"}[slower],) if slower else ("m", "m/s", "rad")
+            )
+            assert column >= 0 or any(other.rate_of == value.name for other in shared), (role, value.name)
+
+
+def test_a_rate_of_what_is_not_shared_is_refused(containment):
+    shared = {"follower": (Quantity("z", "m"), Quantity("v", "m/s", rate_of="y")), "leader": ()}
+    with pytest.raises(
+        SchemeError, match=r"SHARED\[\"follower\"\]: v is called the rate of 'y'; shared beside it are z"
+    ):
+        Scheme("mine", file_like(containment, SHARED=shared))
