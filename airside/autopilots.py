@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.defence.arrays import Defence, new_defence
 from ftcc.airside.diagnosis.arrays import Diagnosis, new_diagnosis
 from ftcc.airside.diagnosis.beliefs import HEALTH_SHARED, belief_signals
 from ftcc.airside.diagnosis.cooperation_arrays import Cooperation, new_cooperation
@@ -98,6 +99,8 @@ class Autopilots(NamedTuple):
     """(k,): flight mode, see `link.flight_modes`."""
     held_us: NDArray[np.int64]
     """(k,): time spent in hold, by which the clocks of references are behind, us."""
+    defence: Defence
+    """What is left of what neighbours tell; one comparison where it is off."""
     diagnosis: Diagnosis | None
     """None without active fault tolerance."""
     cooperation: Cooperation | None
@@ -213,6 +216,7 @@ def build(specs: Sequence[AutopilotSpec], timing: Timing) -> tuple[Autopilots, I
         course=np.array([math.nan if spec.course is None else spec.course for spec in specs]),
         mode=np.full(k, MISSION),
         held_us=np.zeros(k, np.int64),
+        defence=new_defence(specs, scheme, inbox.valid.shape[1], shared_width),
         diagnosis=new_diagnosis(specs, len(scheme.signals), scheme.shared_width) if active else None,
         cooperation=new_cooperation(specs, scheme, weight, profiles.parameters, shared_width) if active else None,
         events=new_events(),

@@ -20,7 +20,10 @@ from ftcc.airside.model import Model
 from ftcc.airside.references import of_plant
 from ftcc.link.actuators import SLOT
 
-__all__ = ["ARGUMENTS", "find_mistakes", "place_of", "shown_path", "similar"]
+__all__ = ["ARGUMENTS", "find_mistakes", "ignores_trust", "place_of", "shown_path", "similar"]
+
+_SUMS = "ftcc.airside.elements.neighbours"
+"""The elements that weigh by ``heard.trust``."""
 
 ARGUMENTS = {
     "start": ("own", "heard", "reference", "model", "gains"),
@@ -64,6 +67,25 @@ def find_mistakes(module: ModuleType, heard_type: Any) -> list[str]:
     return list(dict.fromkeys([*_signatures(module), *_names_of_gains(module), *_commands(module)])) or list(
         dict.fromkeys(_bodies(module, heard_type))
     )
+
+
+def ignores_trust(modules: Iterable[ModuleType]) -> str | None:
+    """Why the defences have no effect on a law, the modules of which are given; None: it weighs by ``heard.trust``.
+
+    Either it reads the field itself, or it leaves its sums to elements that do.
+    """
+    hears = False
+    for module in modules:
+        _, tree = _tree(module)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr == "trust":
+                return None
+            if isinstance(node, ast.ImportFrom) and node.module == _SUMS:
+                return None
+            hears = hears or (isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "heard")
+    if not hears:
+        return "the law hears nobody"
+    return "the law does not weigh by heard.trust, see docs/tutorials/own-law.md"
 
 
 def _functions(module: ModuleType) -> Iterator[tuple[str, Any]]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.defence.events import TRUST_KINDS, trust_text
 from ftcc.airside.diagnosis.beliefs import Belief
 from ftcc.airside.diagnosis.cooperation import BACK, LEFT, NO_ROOM, ROOM, room_text
 from ftcc.airside.diagnosis.events import BELIEVES, belief_text
@@ -75,7 +76,7 @@ def advance_leader(autopilots, inbox, i, now_us, period_us, makes_room):
 
 
 def drain_leader_events(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) -> list[tuple[int, int, str, str]]:
-    """Take the events of leaders, and of UAVs that leave, come back or change a belief, since the last call.
+    """Take the events of leaders, and of UAVs that leave, come back, or change a belief or whom they distrust.
 
     Returns time us, UAV, severity, text of each.
     """
@@ -85,6 +86,10 @@ def drain_leader_events(autopilots: Autopilots, specs: Sequence[AutopilotSpec]) 
             actuator = in_slots(specs[i].diagnosis.actuators)[number]
             before, *belief = autopilots.diagnosis.details[row].tolist()
             events.append((at_us, specs[i].uav, *belief_text(actuator, before, Belief(*belief))))
+            continue
+        if kind in TRUST_KINDS:
+            senders = [neighbour.uav for neighbour in specs[i].neighbours]
+            events.append((at_us, specs[i].uav, *trust_text(kind, number, senders)))
             continue
         if kind in (ROOM, NO_ROOM, LEFT, BACK):
             events.append((at_us, specs[i].uav, *room_text(kind, number)))

@@ -105,6 +105,8 @@ class Heard(NamedTuple):
     """(n,): 1 once the neighbour has been heard."""
     weight: NDArray[np.float64]
     """(n,): a_ij."""
+    trust: NDArray[np.float64]
+    """(n, m): share of its weight that the defences leave each value; 1 while nothing is doubted."""
 
 
 @dataclass(frozen=True)
@@ -285,6 +287,11 @@ class Scheme:
     def briefed(self) -> bool:
         """Whether every UAV knows how its neighbours move at t = 0, before it hears them."""
         return bool(getattr(self.module, "BRIEFED", False))
+
+    @property
+    def carries(self) -> bool:
+        """Whether the law carries neighbours' values to the present by the rates told with them; else it holds them."""
+        return bool(getattr(self.module, "CARRIES", True))
 
     @property
     def shared_width(self) -> int:

@@ -12,7 +12,7 @@ from ftcc.link.actuators import ACTUATORS
 from ftcc.link.attitude_target import UNCODED, AttitudeCode
 from ftcc.link.channel import Channel
 
-__all__ = ["AutopilotSpec", "DiagnosisSpec", "LinkEvent", "Neighbour", "OwnReference", "is_active"]
+__all__ = ["AutopilotSpec", "DefenceSpec", "DiagnosisSpec", "LinkEvent", "Neighbour", "OwnReference", "is_active"]
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,19 @@ class DiagnosisSpec:
 
 
 @dataclass(frozen=True)
+class DefenceSpec:
+    """Defences of one UAV against neighbours that share what is not so."""
+
+    on: bool = False
+    gains: tuple[float, ...] = ()
+    """In the order of `DefenceGains`."""
+    trusted: tuple[int, ...] = ()
+    """Ids of those who are trusted whatever they tell."""
+    leaders: tuple[int, ...] = ()
+    """Ids of the swarm's leaders: they share other values than followers."""
+
+
+@dataclass(frozen=True)
 class AutopilotSpec:
     """One autopilot."""
 
@@ -102,6 +115,7 @@ class AutopilotSpec:
     tolerant_gains: tuple[float, ...] = ()
     """The same with fault tolerance on, where ``gains`` has it off."""
     diagnosis: DiagnosisSpec = DiagnosisSpec()
+    defence: DefenceSpec = DefenceSpec()
     flight: Flight | None = None
     """What the scheme's conditions on gains are checked against, also in flight; None: no check."""
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.defence.stage import defend
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
 from ftcc.airside.leader import advance_leader
@@ -76,6 +77,7 @@ REFUSAL = ""
 SWEEPS: int = getattr(scheme, "SWEEPS", 1)
 """Most exchanges of one instant where the exchange is ideal."""
 
+_T = Own._fields.index("t")
 _DOWN = StateMessage._fields.index("z")
 
 
@@ -91,8 +93,20 @@ def _is_finite(values, count, largest):
 @compiled_within
 def _heard_by(autopilots, inbox, i):
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
-    heard = Heard(inbox.values[i, :n], inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n])
+    defence = autopilots.defence
+    values = inbox.values[i, :n] if defence.on[0] == 0 else defence.values[i, :n]
+    heard = Heard(values, inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n], defence.trust[i, :n])
     return _heard_by_law(autopilots, i, heard)
+
+
+@compiled_within
+def _defend(autopilots, inbox, i, dt):
+    """Leave of what UAV ``i`` has heard what its defences leave; to be called once at every tick."""
+    n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
+    defend(
+        autopilots.defence, i, n, inbox.values[i], inbox.age[i], inbox.valid[i], inbox.stamp[i],
+        autopilots.shared[i], autopilots.events, autopilots.own[i, _T], dt,
+    )  # fmt: skip
 
 
 @compiled_within
@@ -175,6 +189,7 @@ def set_shared(autopilots, inbox, i):
     _start_law(autopilots, inbox, i, own, reference, gains)
     output = fields(_Output, autopilots.output[i])
     store(_share(fields(_State, autopilots.state[i]), own, reference, output, gains), autopilots.shared[i])
+    autopilots.defence.shared_at[i] = own.t
 
 
 @compiled
@@ -198,6 +213,8 @@ def control(autopilots, inbox, i, dt):
     if the law gives a command, a state or a value to share that is not finite.
     """
     autopilots.stepping[0] = i
+    if autopilots.defence.on[0] == 1:
+        _defend(autopilots, inbox, i, dt)
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])
     own, model = _given_to_law(autopilots, i)
@@ -210,6 +227,7 @@ def control(autopilots, inbox, i, dt):
         return False
     store(after, autopilots.state[i])
     store(_share(before, own, reference, output, gains), autopilots.shared[i])
+    autopilots.defence.shared_at[i] = own.t
     if not (
         _is_finite(autopilots.state[i], _STATES, LARGEST_STATE)
         and _is_finite(autopilots.shared[i], _SHARED, LARGEST_COMMAND)

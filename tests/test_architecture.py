@@ -254,7 +254,7 @@ def test_an_autopilot_acts_on_the_messages_and_on_nothing_else(tmp_path, runtime
     scheme, spec = find("containment"), autopilot(1)
     law, gains, mission = scheme.module, scheme.gains("flight", {}), Reference(*spec.reference.initial)
     random = np.random.default_rng(1)
-    nobody = Heard(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
+    nobody = Heard(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
     travel = np.array(vehicle().travel)
     state = None
     with closing(Bench(tmp_path, 19)) as alone, alone as bench:

@@ -231,7 +231,7 @@ def test_compiled_code_leaves_the_line_of_an_error_too(site: Path) -> None:
     arguments = (
         module.State(*(0.0,) * 4),
         own,
-        Heard(zeros((1, 1)), zeros(1), zeros(1), zeros(1)),
+        Heard(zeros((1, 1)), zeros(1), zeros(1), zeros(1), zeros((1, 1))),
         Reference(*(1.0,) * len(Reference._fields)),
         Model(*(1.0,) * len(Model._fields)),
         scheme.gains("flight", {}),

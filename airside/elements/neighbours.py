@@ -1,4 +1,7 @@
-"""Records of the neighbours: extrapolated to the present, compared with the own value, averaged."""
+"""Records of the neighbours: extrapolated to the present, compared with the own value, averaged.
+
+Each value counts with its edge's weight times the trust that the defences leave it, see ``airside.defence``.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,13 @@ def _axes(row, first):
 
 
 @compiled
+def _least_trust(trust):
+    """Of a neighbour's three errors: whose error about one axis is left out is left out about all, as the sums of all
+    three have one weight."""
+    return min(trust[_ERROR], trust[_ERROR + 1], trust[_ERROR + 2])
+
+
+@compiled
 def extrapolated(value, rate, age, horizon):
     """A neighbour's value, extrapolated to the present by the rate that it sent, for at most ``horizon`` seconds."""
     return value + rate * min(age, horizon)
@@ -41,7 +51,7 @@ def disagreement(estimate, heard, ahead, horizon, unheard, leave_out):
     weights = 0.0
     rates = 0.0
     for j in range(heard.weight.shape[0]):
-        weight = heard.weight[j]
+        weight = heard.weight[j] * heard.trust[j, _VALUE]
         if heard.valid[j] > 0.0:
             rate = heard.values[j, _RATE]
             neighbour = extrapolated(heard.values[j, _VALUE], rate, heard.age[j] + ahead, horizon)
@@ -73,7 +83,7 @@ def weighted_average(heard, column, oldest, horizon):
     weights = 0.0
     for j in range(heard.weight.shape[0]):
         if heard.valid[j] > 0.0 and heard.age[j] <= oldest:
-            weight = heard.weight[j]
+            weight = heard.weight[j] * heard.trust[j, column]
             value += weight * extrapolated(heard.values[j, column], heard.values[j, column + 1], heard.age[j], horizon)
             rate += weight * heard.values[j, column + 1]
             weights += weight
@@ -99,7 +109,7 @@ def motion_sums(heard, column, carried):
     rates = 0.0
     for j in range(heard.weight.shape[0]):
         if heard.valid[j] > 0.0:
-            weight = heard.weight[j]
+            weight = heard.weight[j] * heard.trust[j, column]
             rate = heard.values[j, column + 1]
             weights += weight
             positions += weight * (heard.values[j, column] + carried * rate * heard.age[j])
@@ -120,7 +130,7 @@ def error_sums(error, heard, oldest):
     rates = (0.0, 0.0, 0.0)
     for j in range(heard.weight.shape[0]):
         if heard.valid[j] > 0.0 and (oldest <= 0.0 or heard.age[j] <= oldest):
-            weight, record = heard.weight[j], heard.values[j]
+            weight, record = heard.weight[j] * _least_trust(heard.trust[j]), heard.values[j]
             weights += weight
             total = added(total, scaled(weight, turned(error, _axes(record, _ERROR))))
             rates = added(rates, scaled(weight, _axes(record, _ERROR_RATE)))
@@ -149,7 +159,7 @@ def filtered_error_sums(error, heard, memory, w, oldest, h):
                     value, rate = critically_damped_step(value, rate, nearest_turn(target, value), w, h)
                 row[_FILTERED + axis], row[_FILTERED_RATE + axis] = value, rate
             row[_HEARD] = 1.0
-            weight = heard.weight[j]
+            weight = heard.weight[j] * _least_trust(heard.trust[j])
             weights += weight
             total = added(total, scaled(weight, turned(error, _axes(row, _FILTERED))))
             rates = added(rates, scaled(weight, _axes(row, _FILTERED_RATE)))

@@ -206,6 +206,7 @@ SHARED = {
     ),
     "leader": (),
 }
+CARRIES = False
 SIGNALS = (
     *angles("{}_d", "rad", "reference, {}"),
     *angles("E_{}", "rad", "synchronization error, {}", bound="wall"),

@@ -174,6 +174,7 @@ SHARED = {
     ),
     "leader": (),
 }
+CARRIES = False
 SIGNALS = (
     *angles("{}_d", "rad", "reference, {}"),
     *angles("e_{}", "rad", "synchronization error, {}", bound="wall"),

@@ -147,6 +147,7 @@ SHARED = {
         *space("At_{}", "m/s^2", "commanded error acceleration, {}, for the monograph form", rate_of="Vt_{}"),
     )
 }
+CARRIES = False
 _ERROR, _ERROR_RATE, _ERROR_ACCELERATION = 0, 3, 6
 """Columns of what is shared, each the first of three axes."""
 SIGNALS = (
@@ -293,8 +294,9 @@ def _cooperative(heard, column, own, gains):
     degree = 0.0
     for j in range(heard.weight.shape[0]):
         if _in_use(heard, j, gains):
-            total += gains.lam2 * heard.weight[j] * (own - heard.values[j, column])
-            degree += heard.weight[j]
+            weight = heard.weight[j] * heard.trust[j, column]
+            total += gains.lam2 * weight * (own - heard.values[j, column])
+            degree += weight
     return total, degree
 
 
@@ -304,7 +306,7 @@ def _fed(heard, column, gains):
     total = 0.0
     for j in range(heard.weight.shape[0]):
         if _in_use(heard, j, gains):
-            total += heard.weight[j] * heard.values[j, column]
+            total += heard.weight[j] * heard.trust[j, column] * heard.values[j, column]
     return gains.feed * gains.lam2 * total
 
 

@@ -289,9 +289,11 @@ def step(state: State, own: Own, heard: Heard, reference: Reference, model: Mode
     s = state
     # Nearest-neighbour reference (4.10), (4.11).
     V_id, V_id_rate, weights = weighted_average(heard, _SPEED, gains.oldest, gains.horizon)
-    z_id, z_id_rate, _ = weighted_average(heard, _ALTITUDE, gains.oldest, gains.horizon)
+    z_id, z_id_rate, z_weights = weighted_average(heard, _ALTITUDE, gains.oldest, gains.horizon)
     if weights == 0.0:
-        V_id, z_id = s.V_mean, s.z_mean
+        V_id = s.V_mean
+    if z_weights == 0.0:
+        z_id = s.z_mean
     beginning = s.begun == 0.0
     V_d, V_d_rate, z_d, z_d_rate = V_id, V_id_rate, z_id, z_id_rate
     if gains.filter_frequency > 0.0 and not beginning:

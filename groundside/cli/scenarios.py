@@ -80,7 +80,7 @@ def check(
     ] = None,
 ) -> None:
     """Check a scenario without flying it: all cases with claims, or the one that the options name."""
-    from ftcc.groundside.scenario import resolve
+    from ftcc.groundside.scenario import resolve, robustness_text
     from ftcc.groundside.simulation import cases_of, load_case
 
     first = load_scenario(scenario, form, variant, settings)
@@ -95,6 +95,7 @@ def check(
     for file, held in first.places.files().items():
         out.print(f"{file.name}: {held}", markup=False, highlight=False, soft_wrap=not out.is_terminal)
     warned: dict[str, list[str]] = {}
+    graphs: dict[str, None] = {}
     for case, chosen in cases.items():
         mission = resolve(chosen)
         timing = mission.timing
@@ -106,8 +107,11 @@ def check(
             highlight=False,
             soft_wrap=not out.is_terminal,
         )
+        graphs[robustness_text(mission.scheme, mission.graph, mission.autopilots[0].defence)] = None
         for text in mission.warnings:
             warned.setdefault(text, []).append(case)
+    for text in graphs:
+        out.print(text, markup=False, highlight=False, soft_wrap=not out.is_terminal)
     for text, those in warned.items():
         where = f" {', '.join(those)}" if len(those) < len(cases) else ""
         warn(f"{first.name}{where}: {text}")

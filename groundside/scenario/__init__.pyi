@@ -7,6 +7,7 @@ from .catalogue import summary as summary
 from .choosing import ScenarioWarning as ScenarioWarning
 from .choosing import mission_of as mission_of
 from .columns import LEADING as LEADING
+from .defence import robustness_text as robustness_text
 from .faults import TrimDemand as TrimDemand
 from .healthy import HEALTHY as HEALTHY
 from .healthy import healthy_changes as healthy_changes

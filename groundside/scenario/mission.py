@@ -21,7 +21,7 @@ from ftcc.airside.model import Model
 from ftcc.airside.references.position import Fire
 from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import FAULT_TOLERANCE, Flight, Quantity, Scheme
-from ftcc.airside.spec import AutopilotSpec, DiagnosisSpec, LinkEvent, Neighbour, OwnReference
+from ftcc.airside.spec import AutopilotSpec, DefenceSpec, DiagnosisSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.scenario.as_flown import as_flown
 from ftcc.groundside.scenario.checks import (
@@ -36,6 +36,7 @@ from ftcc.groundside.scenario.checks import (
     timing_of,
 )
 from ftcc.groundside.scenario.columns import leading_columns
+from ftcc.groundside.scenario.defence import defence_of
 from ftcc.groundside.scenario.diagnosis import diagnosis_of, health_edges
 from ftcc.groundside.scenario.faults import TrimDemand, check_fault_times, check_faults, trim_demands
 from ftcc.groundside.scenario.fire import check_posts
@@ -156,12 +157,25 @@ def resolve(scenario: Scenario) -> Mission:
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, basis.graph, health_edges(plan, basis.graph), channel, findings.refuse)
     diagnosis = diagnosis_of(plan, basis.scheme, basis.plant, vehicles[0], _is_steered(basis), findings)
+    defence = defence_of(plan, basis.scheme, basis.graph, findings)
     check_delays(plan, basis.timing, findings)
     _check_recorded_columns(plan, basis, diagnosis, findings)
     findings.stop_if_refused()
 
     autopilots = _autopilots(
-        plan, basis, vehicles, model, flight, gains, tolerant, references, profiles, channel, changes, diagnosis
+        plan,
+        basis,
+        vehicles,
+        model,
+        flight,
+        gains,
+        tolerant,
+        references,
+        profiles,
+        channel,
+        changes,
+        diagnosis,
+        defence,
     )
     return Mission(
         name=scenario.name,
@@ -321,6 +335,7 @@ def _autopilots(
     channel: Channel,
     changes: Mapping[int, Sequence[LinkEvent]],
     diagnosis: DiagnosisSpec,
+    defence: DefenceSpec,
 ) -> tuple[AutopilotSpec, ...]:
     """Return the spec of each vehicle's autopilot."""
     graph, scheme = basis.graph, basis.scheme
@@ -335,6 +350,7 @@ def _autopilots(
             gains=tuple(gains[vehicle.uav]),
             tolerant_gains=tuple(tolerant[vehicle.uav]) if tolerant[vehicle.uav] != gains[vehicle.uav] else (),
             diagnosis=diagnosis,
+            defence=defence,
             flight=flight,
             model=model,
             command=vehicle.command,

@@ -8,6 +8,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 
 from ftcc.groundside.schema.aircraft import Plant, Starts
 from ftcc.groundside.schema.base import Id, Strict
+from ftcc.groundside.schema.defence import DefenceFields
 from ftcc.groundside.schema.diagnosis import DiagnosisFields
 from ftcc.groundside.schema.fire import FireEventFields, FireFields
 from ftcc.groundside.schema.network import ChannelFields, GraphFields, LinkEventFields
@@ -127,6 +128,7 @@ class Plan(Strict):
     gains: GainFields = GainFields()
     switches: dict[str, bool] = Field({}, description="false takes a part out of the law: fault_tolerance")
     diagnosis: DiagnosisFields = DiagnosisFields()
+    defence: DefenceFields | None = None
     disturbances: list[DisturbanceFields] = []
     faults: list[FaultFields] = []
     link_events: list[LinkEventFields] = []

@@ -29,7 +29,8 @@ def own(**values: float) -> Own:
 def heard(*neighbours: tuple[float, float, float, float], valid: float = 1.0) -> Heard:
     """Neighbours as (value, rate, age, weight)."""
     rows = np.array(neighbours).reshape(len(neighbours), 4)
-    return Heard(rows[:, :2].copy(), rows[:, 2].copy(), np.full(len(rows), valid), rows[:, 3].copy())
+    values = rows[:, :2].copy()
+    return Heard(values, rows[:, 2].copy(), np.full(len(rows), valid), rows[:, 3].copy(), np.ones(values.shape))
 
 
 NEIGHBOURS = heard((1000.4, 0.3, 0.05, 0.4), (1001.1, -0.2, 0.1, 0.5), (1003.0, 1.5, 0.05, 0.9))

@@ -24,7 +24,7 @@ WEIGHT = np.array([0.4, 0.5, 0.9])
 
 
 def heard(valid: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Heard:
-    return Heard(VALUES, AGE, np.array(valid), WEIGHT)
+    return Heard(VALUES, AGE, np.array(valid), WEIGHT, np.ones(VALUES.shape))
 
 
 def test_a_value_is_carried_by_its_rate_up_to_the_horizon():
@@ -92,7 +92,7 @@ OWN = (0.05, -0.02, 0.01)
 
 
 def told(valid: tuple[float, ...] = (1.0, 1.0, 1.0), errors: np.ndarray = ERRORS) -> Heard:
-    return Heard(errors, AGE, np.array(valid), WEIGHT)
+    return Heard(errors, AGE, np.array(valid), WEIGHT, np.ones(errors.shape))
 
 
 @pytest.mark.parametrize(("oldest", "part"), [(0.0, [0, 1, 2]), (0.5, [0, 1]), (0.06, [0])])

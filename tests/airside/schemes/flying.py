@@ -28,7 +28,7 @@ def heard(*neighbours: tuple[float, ...], weight: tuple[float, ...] = (), age: f
     """Neighbours' shared values; nobody without arguments."""
     n = len(neighbours)
     values = np.array(neighbours, np.float64).reshape(n, -1) if n else np.zeros((0, 4))
-    return Heard(values, np.full(n, age), np.ones(n), np.array(weight or (1.0,) * n))
+    return Heard(values, np.full(n, age), np.ones(n), np.array(weight or (1.0,) * n), np.ones(values.shape))
 
 
 def flight(graph: Graph, period: float = 0.005, **facts: float) -> Flight:
