@@ -6,6 +6,7 @@ acknowledgements travel with their own transmissions.
 
 from __future__ import annotations
 
+import collections
 import time
 from collections.abc import Sequence
 
@@ -22,6 +23,10 @@ __all__ = ["Neighbourhood"]
 
 _EVERYTHING = 2**31 - 1
 """Number that stands for all transmissions, past and to come: of a process that has ended."""
+_KEPT = 64
+"""Transmissions kept: more than a sender may be ahead of its receivers."""
+_STALLED = 5.0
+"""Wall time without progress after which transmissions are sent again, s."""
 _NETWORK_PERIOD = 1.0
 """Wall time between two reports on the network, s."""
 _MOST_RECORDS = 256
@@ -61,6 +66,9 @@ class Neighbourhood:
         self._own = specs[0].uav
         self._traffic = self._mesh.traffic if self._mesh else {}
         self._reported = time.monotonic()
+        self._kept: collections.deque[tuple[int, bytes]] = collections.deque(maxlen=_KEPT if setting.lockstep else 0)
+        """Number and octets of the last transmissions, where they may have to be sent again."""
+        self._progress, self._moved = -1, time.monotonic()
         self._count()
 
     def fileno(self) -> int:
@@ -85,7 +93,11 @@ class Neighbourhood:
     def publish(self) -> None:
         """Put the group's transmission on the mesh."""
         if self._mesh:
-            self._mesh.publish(octets_of(self._group.transmission))
+            octets = octets_of(self._group.transmission)
+            if self._traffic:
+                header = Header(*self._group.transmission.words[: len(Header._fields)].tolist())
+                self._kept.append((header.number, octets))
+            self._mesh.publish(octets)
         self._group.transmission.used[0] = 0
 
     def end(self) -> None:
@@ -117,9 +129,23 @@ class Neighbourhood:
         if sender in self._traffic and header.number != _EVERYTHING:
             self._traffic[sender].numbered(header.number)
         if sender in self._newest:
-            self._newest[sender] = header.number
+            self._newest[sender] = max(self._newest[sender], header.number)
         if sender in self._acknowledged:
-            self._acknowledged[sender] = header.heard
+            self._acknowledged[sender] = max(self._acknowledged[sender], header.heard)
+
+    def send_again_if_stalled(self, progress: int) -> None:
+        """Send again what is not acknowledged, where ``progress`` has not changed for long.
+
+        A link to another computer that was given up while it was down has lost what was on its way.
+        """
+        now = time.monotonic()
+        if progress != self._progress or not self._mesh:
+            self._progress, self._moved = progress, now
+        elif self._traffic and now - self._moved > _STALLED:
+            self._moved = now
+            for number, octets in self._kept:
+                if number > self._group.acknowledged[0]:
+                    self._mesh.publish(octets)
 
     def report_network(self, now_us: int, last: bool = False) -> None:
         """Report once a second, wall time, and at the end how the network serves the links with other computers."""

@@ -236,6 +236,8 @@ class AutopilotProcess:
                 link.attend()
             self.write_if_held()
             self.warn_if_stalled()
+            if self.setting.lockstep:
+                self.neighbourhood.send_again_if_stalled(int(self.group.done.sum()))
             self.neighbourhood.report_network(self.now_us)
 
     def write_if_held(self) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ftcc.link.linger import close_at_once, linger_again
 from ftcc.link.traffic import Traffic
 
 __all__ = ["Mesh", "configuration", "import_zenoh"]
@@ -90,6 +91,7 @@ class Mesh:
         """By sender on another computer: what the network does to its transmissions."""
         self._dated = bool(far)
         self._session = zenoh.open(configuration(zenoh, listen, connect, timeout, security))
+        self._links = [close_at_once(self._session)] if far else []
         self._subscribers = [
             self._session.declare_subscriber(
                 f"{prefix}/{sender}/shared", self._keeper(sender), allowed_origin=zenoh.Locality.REMOTE
@@ -98,8 +100,8 @@ class Mesh:
         ]
         self._publisher = self._session.declare_publisher(
             f"{prefix}/{own}/shared",
-            # In real time a link that is down holds up nobody.
-            congestion_control=zenoh.CongestionControl.BLOCK if ordered else zenoh.CongestionControl.DROP,
+            # In real time a computer that is gone holds up nobody.
+            congestion_control=zenoh.CongestionControl.DROP if far and not ordered else zenoh.CongestionControl.BLOCK,
             express=True,
         )
         self._liveliness = self._session.liveliness().declare_subscriber(
@@ -164,9 +166,11 @@ class Mesh:
 
     def close(self) -> None:
         """Leave the mesh."""
-        declarations: list[Any] = [*self._tokens, self._liveliness, *self._subscribers, self._publisher]
+        declarations: list[Any] = [*self._links, *self._tokens, self._liveliness, *self._subscribers, self._publisher]
         for declared in declarations:
             declared.undeclare()
+        if self._links:
+            linger_again()
         self._session.close()
         os.close(self._bell)
         os.close(self._button)
@@ -182,13 +186,18 @@ def configuration(
         "listen": {"endpoints": [listen] if listen else []},
         "connect": {
             "endpoints": list(connect),
+            # For ever, and an attempt into a dead link is given up soon.
+            "timeout_ms": -1,
+            "exit_on_failure": False,
             "retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
         },
         "transport": {
+            "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
             "link": {
                 "tx": {
                     "lease": round(1000.0 * timeout),
-                    "queue": {"congestion_control": {"block": {"wait_before_close": round(1e6 * max(timeout, 5.0))}}},
+                    # A link that is full for longer is closed; not later than one over which nothing comes.
+                    "queue": {"congestion_control": {"block": {"wait_before_close": round(9e5 * max(timeout, 5.0))}}},
                 }
             },
             "shared_memory": {"enabled": False},

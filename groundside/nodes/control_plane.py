@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ftcc.groundside.nodes.messages import MessageError, decode, encode
+from ftcc.link.linger import close_at_once, linger_again
 from ftcc.link.mesh import configuration, import_zenoh
 
 __all__ = ["Bell", "ControlPlane", "for_node", "from_node"]
@@ -73,7 +74,7 @@ class ControlPlane:
         self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, security))
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
-        self._declared: list[Any] = []
+        self._declared: list[Any] = [close_at_once(self._session)]
         self.refused = 0
         """What came and was no message."""
 
@@ -172,5 +173,6 @@ class ControlPlane:
         """Leave."""
         for declared in self._declared:
             declared.undeclare()
+        linger_again()
         self._session.close()
         self._bell.close()

@@ -45,6 +45,8 @@ _LEAST_START = 0.3
 """Wall time between sending a pace to other computers and its first tick, at least, s."""
 _ROUND_TRIPS = 6.0
 """The same in round trips of the slowest node."""
+_WALL_TIMEOUT = 3.0
+"""On the wall clock a link of the mesh over which nothing comes is given up after so long, s."""
 _FAREWELL = 3.0
 """Longest wait for the nodes to leave, wall s."""
 _LOG = "node-{}.log"
@@ -295,7 +297,7 @@ class Nodes:
     @property
     def _mesh_timeout(self) -> float:
         """In lockstep nothing may be lost while a link is down; on the wall clock a new link serves sooner."""
-        return self.plan.timeout if self._lockstep else min(2.0, self.plan.timeout)
+        return self.plan.timeout if self._lockstep else min(_WALL_TIMEOUT, self.plan.timeout)
 
     def _flown_at(self, part: Part) -> str:
         return self.place(part.uavs[0])[0 if part.kind == "vehicle" else 1]
