@@ -131,25 +131,23 @@ class Host:
 
     def link_down(self) -> None:
         """Pull the cable at the switch: the host itself sees a cable that is in, so no program is told."""
-        self._switch.call(f"ip link set {self._port} nomaster")
-        if self._wire is not None:
-            self._tell(Weather(loss=1.0))
+        self.weather(Weather(loss=1.0))
 
     def link_up(self) -> None:
-        """Put the cable back in, into a good wire."""
+        """Put the cable back in."""
         self.weather(Weather())
 
     def weather(self, weather: Weather) -> None:
         """From now on, frames from and to this host travel as ``weather`` says."""
-        if self._wire is None and weather == Weather():
-            self._switch.call(f"ip link set {self._port} master switch")
-            return
-        if self._wire is None:
-            self._lay_wire()
-        self._tell(weather)
+        self.lay_wire()
+        assert self._wire is not None and self._wire.stdin is not None
+        self._wire.stdin.write(to_json(weather))
+        self._await_wire()
 
-    def _lay_wire(self) -> None:
-        """Take the host's cable out of the switch, and put a process between the two."""
+    def lay_wire(self) -> None:
+        """Put a process between this host and the switch. While a busy flight goes on this takes seconds, so before."""
+        if self._wire is not None:
+            return
         inner, outer = f"in-{self.name}", f"out-{self.name}"
         self._switch.call(f"ip link set {self._port} nomaster")
         self._switch.call(f"ip link add {inner} type veth peer name {outer}")
@@ -157,11 +155,6 @@ class Host:
         self._switch.call(f"ip link set {outer} up")
         command = [*self._switch.network, sys.executable, str(_WIRE), self._port, outer]
         self._wire = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
-        self._await_wire()
-
-    def _tell(self, weather: Weather) -> None:
-        assert self._wire is not None and self._wire.stdin is not None
-        self._wire.stdin.write(to_json(weather))
         self._await_wire()
 
     def _await_wire(self) -> None:
