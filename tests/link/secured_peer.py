@@ -1,0 +1,149 @@
+"""A process with one secured peer of the mesh, told what to do line by line: a JSON list in, a JSON value out."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from ftcc.link.mesh import Mesh
+from ftcc.link.mesh_refusals import _MOST, RefusalCounter
+from ftcc.link.mesh_security import Credentials, Rights, security, uav_access
+
+SWARM = "run"
+
+
+class Peer:
+    """The commands."""
+
+    def open(
+        self,
+        *,
+        keys: str,
+        name: str,
+        own: int,
+        hears: list[int],
+        heard_by: list[int],
+        listen: int = 0,
+        connect: tuple[int, ...] = (),
+        scheme: str = "tls",
+        lawless: bool = False,
+        messages: bool = True,
+    ) -> None:
+        """Open the mesh of process ``own`` with the certificate ``name``.
+
+        ``scheme`` "tcp": without certificates. ``lawless``: without access control of its own, as an attacker would.
+        """
+        here = f"{scheme}/127.0.0.1:{{}}".format
+        others = uav_access(SWARM, own, hears, heard_by)
+        self.refusals = RefusalCounter(others, messages=messages)
+        secured: dict[str, Any] = {}
+        if scheme == "tls":
+            secured = security(Credentials(Path(keys), name), others)
+            if lawless:
+                del secured["access_control"]
+        self.mesh = Mesh(
+            SWARM, own, hears, heard_by, here(listen) if listen else None, list(map(here, connect)), True,
+            security=secured,
+        )  # fmt: skip
+        self.refusals.watch(self.mesh._session)
+
+    def open_for(
+        self, *, keys: str, name: str, listen: int, rights: dict[str, dict[str, list[str]]], hear: str
+    ) -> None:
+        """A peer with rights of the test's choice, which subscribes to ``hear``."""
+        others = {other: Rights(**{what: tuple(keys) for what, keys in some.items()}) for other, some in rights.items()}
+        self.refusals = RefusalCounter(others)
+        secured = security(Credentials(Path(keys), name), others)
+        self.mesh = Mesh(SWARM, 1, [], [], f"tls/127.0.0.1:{listen}", [], True, security=secured)
+        self.refusals.watch(self.mesh._session)
+        self.heard: list[str] = []
+        self.subscriber = self.mesh._session.declare_subscriber(
+            hear, lambda sample: self.heard.append(f"{sample.key_expr} {bytes(sample.payload).decode()}")
+        )
+
+    def all_heard(self) -> list[str]:
+        return self.heard
+
+    def wait_until_ready(self, seconds: float) -> bool:
+        until = time.monotonic() + seconds
+        while not self.mesh.ready and time.monotonic() < until:
+            time.sleep(0.005)
+        return self.mesh.ready
+
+    def publish(self, text: str) -> None:
+        self.mesh.publish(text.encode())
+
+    def put(self, key: str, text: str) -> None:
+        """Put something under a key that is another's."""
+        self.mesh._session.put(key, text.encode())
+
+    def receive(self, count: int, seconds: float) -> list[list[Any]]:
+        """All that comes until ``count`` records are there: the process that they claim to be of, and the text."""
+        arrived: list[list[Any]] = []
+        until = time.monotonic() + seconds
+        while len(arrived) < count and time.monotonic() < until:
+            arrived += [[sender, payload.decode()] for sender, payload in self.mesh.receive()]
+            time.sleep(0.002)
+        return arrived
+
+    def links(self) -> list[str]:
+        return [link.auth_identifier for link in self.mesh._session.info.links()]
+
+    def refused(self, seconds: float, reason: str = "") -> list[list[Any]]:
+        """Refusals since the last call, by waiting until there is one with ``reason``, or none after ``seconds``."""
+        found: dict[tuple[str, str], int] = {}
+        until = time.monotonic() + seconds
+        while True:
+            for one in self.refusals.poll():
+                found[one[:2]] = found.get(one[:2], 0) + one.times
+            if time.monotonic() > until or (reason and any(reason in what for what, _ in found)):
+                return [[*what, count] for what, count in found.items()]
+            time.sleep(0.01)
+
+    def publish_many(self, count: int) -> None:
+        for n in range(count):
+            self.mesh.publish(f"{n}{' ' * 100}".encode())
+
+    def flood(self, lines: int) -> list[int]:
+        """Lines as Zenoh writes them, of keys that an attacker chooses: kinds of refusals, all of them, the limit."""
+        kinds = total = 0
+        for first in range(0, lines, 500):
+            text = "".join(
+                "2026-01-01T00:00:00.000000Z TRACE app-0 ThreadId(02) "
+                "zenoh::net::routing::interceptor::access_control: "
+                f"Using cached result: ab is unauthorized to Put (ingress) on ftcc/run/{n}\n"
+                for n in range(first, first + 500)
+            ).encode()
+            while text:
+                text = text[os.write(1, text) :]
+                self.refusals._drain()
+        for one in self.refusals.poll():
+            kinds, total = kinds + 1, total + one.times
+        return [kinds, total, _MOST]
+
+    def say(self, text: str) -> None:
+        """Print, which must not be lost among Zenoh's lines."""
+        print(text, flush=True)
+
+    def close(self) -> list[list[Any]]:
+        self.mesh.close()
+        return [list(one) for one in self.refusals.close()]
+
+
+if __name__ == "__main__":
+    peer = Peer()
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)  # as in our processes: output and errors go to a log
+    try:
+        for line in sys.stdin:
+            name, arguments = json.loads(line)
+            answers.write(json.dumps(getattr(peer, name)(**arguments)) + "\n")
+    except Exception:
+        traceback.print_exc()
+    # Threads of Zenoh would keep a process alive that ends in any other way.
+    os._exit(1)
