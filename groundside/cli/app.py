@@ -17,6 +17,7 @@ from ftcc.groundside.cli import (
     fly,
     ground,
     identify,
+    mesh_keys,
     movie,
     new,
     node,
@@ -134,6 +135,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"max_content_width": 110},
 )
+ground.keys.command("mesh")(mesh_keys.mesh)
 for _title, _commands in _SECTIONS.items():
     for _command in _commands:
         if isinstance(_command, typer.Typer):

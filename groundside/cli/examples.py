@@ -52,5 +52,6 @@ EXAMPLES = {
     "ftcc speed": "ftcc speed max",
     "ftcc keys": "ftcc keys new",
     "ftcc keys new": "ftcc keys new swarm.key",
+    "ftcc keys mesh": "ftcc keys mesh keys --swarm demo --uavs 1-8 --node a --node b",
 }
 """By the path of the command."""

@@ -52,7 +52,7 @@ link = typer.Typer(name="link", no_args_is_help=True, help="Cut, degrade and res
 param = typer.Typer(
     name="param", no_args_is_help=True, help="Read and set parameters: gains, channel, failure sizes, rates."
 )
-keys = typer.Typer(name="keys", no_args_is_help=True, help="Make keys for signed links to the ground.")
+keys = typer.Typer(name="keys", no_args_is_help=True, help="Make keys: signed links to the ground, encrypted mesh.")
 
 
 @contextmanager
