@@ -14,9 +14,21 @@ import numpy as np
 
 from ftcc.airside.group import AutopilotGroup
 from ftcc.airside.spec import AutopilotSpec
-from ftcc.link.exchange import Header, begin, new_transmission, octets_of, problem_text, take_in
+from ftcc.link.exchange import (
+    Header,
+    Transmission,
+    begin,
+    new_transmission,
+    octets_of,
+    problem_text,
+    senders_in,
+    take_in,
+)
 from ftcc.link.gate import EventReport, Gate, NetworkReport
 from ftcc.link.mesh import Mesh
+from ftcc.link.mesh_keys import uav_name
+from ftcc.link.mesh_refusals import RefusalCounter
+from ftcc.link.mesh_security import Credentials, security, uav_access
 from ftcc.link.process import Setting
 
 __all__ = ["Neighbourhood"]
@@ -29,6 +41,8 @@ _STALLED = 5.0
 """Wall time without progress after which transmissions are sent again, s."""
 _NETWORK_PERIOD = 1.0
 """Wall time between two reports on the network, s."""
+_REFUSALS_PERIOD = 5.0
+"""Wall time between two reports on who was refused, s: what comes in between is counted."""
 _MOST_RECORDS = 256
 """In a transmission."""
 
@@ -51,6 +65,8 @@ class Neighbourhood:
         """Number up to which each receiving process has this one's."""
         self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
         self._mesh: Mesh | None = None
+        self._refusals: RefusalCounter | None = None
+        self._refusals_told = time.monotonic()
         if linked:
             group.on_mesh[0] = 1
             # A peer listens on the port of its process's first UAV; of two peers the later one connects.
@@ -60,9 +76,26 @@ class Neighbourhood:
             # In lockstep an edge is subscribed to at both ends, for the acknowledgements.
             sources, targets = (linked, linked) if setting.lockstep else (senders, receivers)
             far = [peer for peer in linked if setting.is_far(peer)]
+            secured = {}
+            if setting.tls is not None:
+                rights = uav_access(setting.swarm, me, sources, targets)
+                secured = security(Credentials(setting.tls, uav_name(me)), rights)
+                names = {setting.mesh_endpoint(peer): uav_name(peer) for peer in linked}
+                self._refusals = RefusalCounter(rights, names)
             self._mesh = Mesh(
-                setting.swarm, me, sources, targets, listen, connect, setting.lockstep, setting.link_timeout, far
+                setting.swarm,
+                me,
+                sources,
+                targets,
+                listen,
+                connect,
+                setting.lockstep,
+                setting.link_timeout,
+                far,
+                secured,
             )
+            if self._refusals is not None:
+                self._refusals.watch(self._mesh.session)
         self._own = specs[0].uav
         self._traffic = self._mesh.traffic if self._mesh else {}
         self._reported = time.monotonic()
@@ -121,6 +154,10 @@ class Neighbourhood:
             return
         incoming.words[:words] = np.frombuffer(payload, "<i8")
         incoming.used[0] = words
+        stranger = self._not_of(sender, incoming)
+        if stranger is not None:
+            self._warn_once(f"the process of UAV {sender} speaks in the name of UAV {stranger}")
+            return
         problem = take_in(incoming, self._group.exchange)
         if problem:
             self._warn_once(problem_text(problem, incoming))
@@ -132,6 +169,10 @@ class Neighbourhood:
             self._newest[sender] = max(self._newest[sender], header.number)
         if sender in self._acknowledged:
             self._acknowledged[sender] = max(self._acknowledged[sender], header.heard)
+
+    def _not_of(self, sender: int, transmission: Transmission) -> int | None:
+        """A UAV whose record stands in a transmission although it does not fly in the process of its sender."""
+        return next((uav for uav in senders_in(transmission) if self._peer_of.get(uav) != sender), None)
 
     def send_again_if_stalled(self, progress: int) -> None:
         """Send again what is not acknowledged, where ``progress`` has not changed for long.
@@ -153,6 +194,14 @@ class Neighbourhood:
             self._reported = time.monotonic()
             for sender, traffic in self._traffic.items():
                 self._gate.report(NetworkReport(self._own, sender, now_us, *traffic.report()))
+
+    def report_refusals(self, last: bool = False) -> None:
+        """Report now and then, and at the end, who was refused by the mesh."""
+        now = time.monotonic()
+        if self._refusals is not None and (last or now - self._refusals_told >= _REFUSALS_PERIOD):
+            self._refusals_told = now
+            for refusal in self._refusals.poll():
+                self._gate.report(EventReport("warning", refusal.text))
 
     def _warn_once(self, text: str) -> None:
         self._bad += 1
@@ -176,3 +225,5 @@ class Neighbourhood:
         """Leave the mesh."""
         if self._mesh:
             self._mesh.close()
+        if self._refusals is not None:
+            self._refusals.close()

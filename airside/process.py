@@ -141,6 +141,7 @@ class AutopilotProcess:
         self.stall.progress()
         while not self.neighbourhood.ready and not self.gate.stopping:
             self.waiter.wait(_SUBSCRIPTIONS)
+            self.neighbourhood.report_refusals()
             if self.stall.long:
                 self.gate.report(EventReport("warning", f"mesh: still waiting for {self.neighbourhood.awaited}"))
 
@@ -239,6 +240,7 @@ class AutopilotProcess:
             if self.setting.lockstep:
                 self.neighbourhood.send_again_if_stalled(int(self.group.done.sum()))
             self.neighbourhood.report_network(self.now_us)
+            self.neighbourhood.report_refusals()
 
     def write_if_held(self) -> None:
         """Write what has been recorded when the swarm is held, for who looks now."""
@@ -292,6 +294,7 @@ class AutopilotProcess:
         """Release all who wait for this process, write what it has recorded, and wait until all have ended."""
         self.group.alive[:] = 0
         self.neighbourhood.report_network(self.now_us, last=True)
+        self.neighbourhood.report_refusals(last=True)
         self.neighbourhood.end()
         for link in self.gcs_links:
             link.end()

@@ -32,6 +32,7 @@ __all__ = [
     "octets_of",
     "post",
     "problem_text",
+    "senders_in",
     "take_in",
 ]
 
@@ -238,6 +239,15 @@ def take_in(transmission, exchange):
             values = floats[at + _PREFIX : at + width]
             post(exchange, exchange.row_of[record.uav], record.sequence, record.stamp_us, record.radio_on, values)
     return _GOOD
+
+
+def senders_in(transmission: Transmission) -> list[int]:
+    """Ids of the UAVs whose records stand in a transmission; empty where it is too short for what it says."""
+    used, (_, _, _, _, records, values) = int(transmission.used[0]), transmission.words[:_HEADER].tolist()
+    width = _PREFIX + values
+    if records < 0 or values < 0 or used < _HEADER + records * width:
+        return []
+    return transmission.words[_HEADER : _HEADER + records * width : width].tolist()  # type: ignore[no-any-return]
 
 
 def problem_text(code: int, transmission: Transmission) -> str:

@@ -129,6 +129,11 @@ class Mesh:
         if sample.kind == self._zenoh.SampleKind.PUT:
             self._awaited.discard(str(sample.key_expr))
 
+    @property
+    def session(self) -> Any:
+        """Zenoh's session."""
+        return self._session
+
     def fileno(self) -> int:
         """For ``select``: readable once something has arrived since the last `receive`."""
         return self._bell

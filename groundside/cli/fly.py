@@ -22,7 +22,7 @@ from ftcc.groundside.cli.common import (
     scenario_names,
 )
 from ftcc.groundside.cli.flight_output import FlightOutput, JsonOutput, TerminalOutput, print_line
-from ftcc.groundside.cli.node import Insecure, Tls, check_secrecy
+from ftcc.groundside.cli.node import Insecure, Tls, check_secrecy, refused_keys
 from ftcc.groundside.cli.vehicle import check_door_options, fly_by_px4
 
 if TYPE_CHECKING:
@@ -127,6 +127,8 @@ def fly(
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     if plan is not None:
         plan.require_in(spec.uav for spec in mission.vehicles)
+    if tls is not None:
+        _check_keys(tls, plan, mission, pack)
     options, ports = prepare_flight(
         mission,
         out,
@@ -160,6 +162,20 @@ def _plan_of(nodes: Path | None, ssh: bool, tls: Path | None, insecure: bool) ->
 
     check_secrecy(tls, insecure)
     return read_plan(nodes)
+
+
+def _check_keys(tls: Path, plan: NodesPlan | None, mission: Mission, pack: str) -> None:
+    """Refuse keys with which the processes here cannot fly."""
+    from ftcc.groundside.swarm import grouped, pack_of
+    from ftcc.link.mesh_keys import LEAD, uav_name
+    from ftcc.link.mesh_security import Credentials
+
+    uavs = [spec.uav for spec in mission.autopilots]
+    groups = grouped(uavs, pack_of(pack, len(uavs)), plan.place if plan else lambda _: ("", ""))
+    first = [group[0] for group in groups if plan is None or not plan.autopilot_at(group[0])]
+    with refused_keys():
+        for name in ([LEAD] if plan else []) + [uav_name(uav) for uav in first]:
+            Credentials(tls, name)
 
 
 def _gathered(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +15,7 @@ from ftcc.groundside.cli.common import Out, fail, load_mission, scenario_names
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["Insecure", "Tls", "check_secrecy", "node"]
+__all__ = ["Insecure", "Tls", "check_secrecy", "node", "refused_keys"]
 
 _FAILED = 1
 
@@ -23,6 +25,17 @@ Tls = Annotated[
 Insecure = Annotated[
     bool, typer.Option("--insecure", help="Let the swarm speak in plain text between computers, to everybody.")
 ]
+
+
+@contextlib.contextmanager
+def refused_keys() -> Iterator[None]:
+    """End with one line and exit code 2 where keys of the mesh cannot be used."""
+    from ftcc.link.mesh_keys import MeshKeysError
+
+    try:
+        yield
+    except MeshKeysError as error:
+        fail(f"--tls {error}")
 
 
 def check_secrecy(tls: Path | None, insecure: bool) -> None:
@@ -82,9 +95,10 @@ def node(
     def load(folder: Path) -> Mission:
         return load_mission(str(folder), None, "", None, None, None)
 
-    ended = run_node(
-        options, {}, load, lambda flown: new_folder(f"{flown}-{name}", out), lambda text: print(text, flush=True)
-    )
+    with refused_keys():
+        ended = run_node(
+            options, load, lambda flown: new_folder(f"{flown}-{name}", out), lambda text: print(text, flush=True)
+        )
     if not ended:
         raise typer.Exit(_FAILED)
 

@@ -10,15 +10,21 @@ import collections
 import contextlib
 import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from ftcc.groundside.nodes.messages import MessageError, decode, encode
 from ftcc.link.linger import close_at_once, linger_again
 from ftcc.link.mesh import configuration, import_zenoh
+from ftcc.link.mesh_keys import LEAD
+from ftcc.link.mesh_refusals import RefusalCounter
+from ftcc.link.mesh_security import Credentials, Rights, security
 
-__all__ = ["Bell", "ControlPlane", "for_node", "from_node"]
+__all__ = ["PLANE", "Bell", "ControlPlane", "for_node", "from_node"]
 
-_PREFIX = "ftcc/nodes"
+PLANE = "nodes"
+"""Takes the place of a swarm's name in keys."""
+_PREFIX = f"ftcc/{PLANE}"
 _JOIN = f"{_PREFIX}/lead/join"
 _CLOCK = f"{_PREFIX}/lead/clock"
 _LEAD_ALIVE = f"{_PREFIX}/lead/alive"
@@ -65,13 +71,30 @@ class ControlPlane:
     ----------
     listen, connect : endpoints of Zenoh, such as "tls/10.0.0.1:7447"; the lead listens, a node connects.
     timeout : silence after which a link counts as broken, wall s.
-    security : see `Mesh`.
+    tls : folder of keys, or None: nothing is encrypted.
+    own : the name in this end's certificate.
+    others : what may pass between this end and others, by the names in their certificates, see `access_control`.
     """
 
-    def __init__(self, listen: str | None, connect: str | None, timeout: float, security: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        listen: str | None,
+        connect: str | None,
+        timeout: float,
+        tls: Path | None,
+        own: str,
+        others: Mapping[str, Rights],
+    ) -> None:
+        self._refusals: RefusalCounter | None = None
+        settings: Mapping[str, Any] = {}
+        if tls is not None:
+            settings = security(Credentials(tls, own), others)
+            self._refusals = RefusalCounter(others, {connect: LEAD} if connect else {}, messages=False)
         self._zenoh = import_zenoh()
         connects = [connect] if connect else []
-        self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, security))
+        self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, settings))
+        if self._refusals is not None:
+            self._refusals.watch(self._session)
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
         self._declared: list[Any] = [close_at_once(self._session)]
@@ -89,6 +112,10 @@ class ControlPlane:
         while self._arrived:
             came.append(self._arrived.popleft())
         return came
+
+    def refusals(self) -> list[str]:
+        """Return who was refused since the last call, as texts."""
+        return [] if self._refusals is None else [refusal.text for refusal in self._refusals.poll()]
 
     def keep(self, sender: str, what: Any) -> None:
         """Keep something for `take`; from any thread."""
@@ -175,4 +202,6 @@ class ControlPlane:
             declared.undeclare()
         linger_again()
         self._session.close()
+        if self._refusals is not None:
+            self._refusals.close()
         self._bell.close()

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.nodes.clock import Offset, with_unix
-from ftcc.groundside.nodes.control_plane import ControlPlane, for_node, from_node
+from ftcc.groundside.nodes.control_plane import PLANE, ControlPlane, for_node, from_node
 from ftcc.groundside.nodes.files import FileError, Receiver
 from ftcc.groundside.nodes.messages import (
     Delivered,
@@ -33,6 +33,8 @@ from ftcc.groundside.text import ids
 from ftcc.link.addresses import is_loopback, resolve
 from ftcc.link.gate import EventReport
 from ftcc.link.mavlink import LOOPBACK
+from ftcc.link.mesh_keys import LEAD
+from ftcc.link.mesh_security import lead_access
 from ftcc.link.ports import PortBlock
 from ftcc.link.process import MeshPlace, Setting
 
@@ -47,6 +49,8 @@ _ROUND_TRIPS = 6.0
 """The same in round trips of the slowest node."""
 _WALL_TIMEOUT = 3.0
 """On the wall clock a link of the mesh over which nothing comes is given up after so long, s."""
+_REFUSALS_PERIOD = 5.0
+"""Wall time between two reports on who was refused, s: what comes in between is counted."""
 _FAREWELL = 3.0
 """Longest wait for the nodes to leave, wall s."""
 _LOG = "node-{}.log"
@@ -112,7 +116,6 @@ class Nodes:
     lockstep : whether all wait for each other.
     signed : whether MAVLink to the ground is signed.
     tls : folder of keys, or None: nothing is encrypted.
-    security : settings of Zenoh for the control plane, see `Mesh`.
     """
 
     def __init__(
@@ -125,7 +128,6 @@ class Nodes:
         lockstep: bool,
         signed: bool = False,
         tls: Path | None = None,
-        security: Mapping[str, Any] | None = None,
     ) -> None:
         plan.require_in(spec.uav for spec in mission.vehicles)
         self.plan = plan
@@ -137,6 +139,7 @@ class Nodes:
         self._signed = signed
         self._tls = tls
         self._started = False
+        self._refusals_told = 0.0
         self._nodes = {
             node.name: _Node(
                 node,
@@ -148,7 +151,8 @@ class Nodes:
         address, port = resolve(plan.listen)
         self._address = address
         self.endpoint = f"{'tls' if tls else 'tcp'}/{f'[{address}]' if ':' in address else address}:{port}"
-        self._control = ControlPlane(self.endpoint, None, plan.timeout, security or {})
+        rights = lead_access(PLANE, self._nodes)
+        self._control = ControlPlane(self.endpoint, None, plan.timeout, tls, LEAD, rights)
         for name, node in self._nodes.items():
             self._control.listen_for_messages(from_node(name, "message"), name)
             self._control.listen_for_bytes(from_node(name, "file"), self._file_taker(node))
@@ -210,6 +214,7 @@ class Nodes:
                         raise NodesError(f"node {name}: {why}")
                     case False:
                         node.address, node.placed = "", None
+            self._say_refusals(report)
             for node in self._nodes.values():
                 if node.ssh is not None and node.ssh.poll() is not None:
                     raise NodesError(
@@ -217,6 +222,13 @@ class Nodes:
                     )
         slowest = max(node.offset.uncertainty for node in self._nodes.values())
         self.start_delay = max(_LEAST_START, 2.0 * _ROUND_TRIPS * slowest)
+
+    def _say_refusals(self, report: Callable[[str], None]) -> None:
+        """Report now and then who was refused."""
+        if time.monotonic() - self._refusals_told >= _REFUSALS_PERIOD:
+            self._refusals_told = time.monotonic()
+            for text in self._control.refusals():
+                report(text)
 
     def _check_clock(self, node: _Node) -> None:
         """Refuse the wall clock where the clock of a node is off."""
@@ -266,7 +278,7 @@ class Nodes:
 
     def place(self, uav: int) -> tuple[str, str]:
         """Return where the vehicle and the autopilot of a UAV fly; "" stands for this computer."""
-        return self.plan.vehicle_at(uav), self.plan.autopilot_at(uav)
+        return self.plan.place(uav)
 
     def start(self, setting: Setting, parts: Sequence[Part]) -> Setting:
         """Start ``parts`` on the nodes; return the setting with the places of all processes of the mesh."""
@@ -358,6 +370,7 @@ class Nodes:
                     came += self._give_up(node, f"node {name} at {node.address} is gone")
                 case FileError():
                     came.append((None, EventReport("error", f"node {name}: {what}")))
+        self._say_refusals(lambda text: came.append((None, EventReport("warning", text))))
         return came
 
     def _give_up(self, node: _Node, text: str) -> list[tuple[Child | None, Any]]:

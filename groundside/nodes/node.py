@@ -6,13 +6,13 @@ import dataclasses
 import selectors
 import socket
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftcc.groundside.nodes.clock import measure, with_monotonic
-from ftcc.groundside.nodes.control_plane import ControlPlane, for_node, from_node
+from ftcc.groundside.nodes.control_plane import PLANE, ControlPlane, for_node, from_node
 from ftcc.groundside.nodes.files import pieces, recorded_files
 from ftcc.groundside.nodes.messages import (
     Delivered,
@@ -33,6 +33,8 @@ from ftcc.groundside.swarm import Exited, LocalProcesses
 from ftcc.link.addresses import Address, is_loopback
 from ftcc.link.gate import Ended, Stop
 from ftcc.link.mavlink import LOOPBACK
+from ftcc.link.mesh_keys import node_name, uav_name
+from ftcc.link.mesh_security import Credentials, node_access
 from ftcc.link.ports import PortBlock, PortError, reserve
 from ftcc.link.process import Setting
 
@@ -74,7 +76,6 @@ class NodeOptions:
 
 def run_node(
     options: NodeOptions,
-    security: Mapping[str, Any],
     load: Callable[[Path], Mission],
     new_folder: Callable[[str], Path],
     say: Callable[[str], None],
@@ -84,7 +85,6 @@ def run_node(
     Parameters
     ----------
     options : how it takes part.
-    security : settings of Zenoh for the control plane, see `Mesh`.
     load : reads the scenario of a run's folder.
     new_folder : makes the folder of a run of the scenario with that name.
     say : prints a line for the user.
@@ -98,17 +98,20 @@ def run_node(
         host, port = options.lead
         shown = f"[{host}]" if ":" in host else host
         endpoint = f"{'tls' if options.tls else 'tcp'}/{shown}:{port}"
-        control = ControlPlane(None, endpoint, options.timeout, security)
+        rights = node_access(PLANE, options.name)
+        control = ControlPlane(None, endpoint, options.timeout, options.tls, node_name(options.name), rights)
         stack.callback(control.close)
         say(f"node {options.name}: waiting for the swarm at {shown}:{port}")
         control.listen_for_messages(for_node(options.name, "message"), "lead")
-        welcome = _join(control, options)
+        welcome = _join(control, options, say)
         control.live(from_node(options.name, "alive"))
         control.watch_lead(lambda there: control.keep("lead", there))
         node = _Node(options, control, welcome, say)
         with _said_to_lead(control, options.name):
             node.place(load, new_folder, stack)
             start = node.wait_for_start()
+            if start is not None:
+                node.require_keys(start)
         if start is None:
             say("the leading computer is gone before the flight began")
             return False
@@ -127,7 +130,7 @@ def _said_to_lead(control: ControlPlane, name: str) -> Iterator[None]:
         raise
 
 
-def _join(control: ControlPlane, options: NodeOptions) -> Welcome:
+def _join(control: ControlPlane, options: NodeOptions, say: Callable[[str], None]) -> Welcome:
     """Ask until the leading computer answers."""
     request = Join(
         name=options.name,
@@ -145,6 +148,8 @@ def _join(control: ControlPlane, options: NodeOptions) -> Welcome:
                 return answer
             case Refused(why):
                 raise NodesError(f"node {options.name}: refused: {why}")
+        for text in control.refusals():
+            say(text)
         time.sleep(_PAUSE)
 
 
@@ -207,6 +212,13 @@ class _Node:
                         return what
                     if what is False:
                         return None
+
+    def require_keys(self, start: Start) -> None:
+        """Refuse to start processes whose keys cannot be used."""
+        if self.options.tls is not None:
+            for part in start.parts:
+                if part.kind == "autopilot":
+                    Credentials(self.options.tls, uav_name(part.uavs[0]))
 
     def fly(self, start: Start, stack: ExitStack) -> bool:
         """Run the processes until they are released; return whether the leading computer was there all the time."""

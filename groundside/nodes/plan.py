@@ -89,6 +89,10 @@ class NodesPlan(Strict):
         """Return the name of the node on which an autopilot flies; "" for the leading computer."""
         return next((node.name for node in self.nodes if uav in node.uavs or uav in node.autopilots), "")
 
+    def place(self, uav: int) -> tuple[str, str]:
+        """Return where the vehicle and the autopilot of a UAV fly."""
+        return self.vehicle_at(uav), self.autopilot_at(uav)
+
     def require_in(self, uavs: Iterable[int]) -> None:
         """Refuse UAVs that the swarm does not have.
 

@@ -17,8 +17,10 @@ from .flight import fly_swarm as fly_swarm
 from .launcher import Elsewhere as Elsewhere
 from .launcher import Outcome as Outcome
 from .launcher import automatic_pack as automatic_pack
+from .launcher import grouped as grouped
 from .open_files import provide_files as provide_files
 from .preparing import check_choices as check_choices
+from .preparing import pack_of as pack_of
 from .preparing import prepare_flight as prepare_flight
 from .registry import Entry as Entry
 from .registry import ask_swarm as ask_swarm

@@ -23,7 +23,7 @@ from ftcc.link.signing import KeyFileError, Signing, read_key, stamps_file
 if TYPE_CHECKING:
     from ftcc.groundside.scenario import Mission
 
-__all__ = ["check_choices", "prepare_flight"]
+__all__ = ["check_choices", "pack_of", "prepare_flight"]
 
 _LAST_SYSTEM = 239
 """Greatest MAVLink system id of a UAV."""
@@ -80,7 +80,7 @@ def prepare_flight(
     if not mission.wire:
         raise SwarmError(f"form {mission.form!r} has ideal exchange and flies in one process only; use `ftcc simulate`")
     uavs = [spec.uav for spec in mission.vehicles]
-    count = _pack_of(pack, len(uavs))
+    count = pack_of(pack, len(uavs))
     listeners = _listeners_of(mavlink)
     if not 0 <= id_offset <= _LAST_SYSTEM - max(uavs):
         raise SwarmError(
@@ -114,7 +114,14 @@ def prepare_flight(
     return options, ports
 
 
-def _pack_of(given: int | str, uavs: int) -> int:
+def pack_of(given: int | str, uavs: int) -> int:
+    """Return the number of vehicles per process that ``--pack`` asks for.
+
+    Raises
+    ------
+    SwarmError
+        If it is neither "auto" nor such a number.
+    """
     if given == "auto":
         return automatic_pack(uavs)
     if not str(given).isdecimal() or not 1 <= int(given) <= uavs:
