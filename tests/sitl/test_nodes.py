@@ -51,7 +51,8 @@ def node(tmp_path: Path, environment: dict[str, str], port: int) -> Iterator[Nod
     started: list[subprocess.Popen[str]] = []
 
     def start(name: str, *arguments: str) -> subprocess.Popen[str]:
-        command = [*FTCC, "node", *arguments, "--join", f"127.0.0.1:{port}", "--name", name, "--insecure"]
+        secrecy = [] if "--tls" in arguments else ["--insecure"]
+        command = [*FTCC, "node", *arguments, "--join", f"127.0.0.1:{port}", "--name", name, *secrecy]
         started.append(
             subprocess.Popen(
                 [*command, "--out", str(tmp_path / f"{name}-{len(started)}")],
@@ -83,26 +84,37 @@ def test_it_equals_the_simulation_wherever_vehicles_and_autopilots_fly(
     plan: Path,
     tmp_path: Path,
 ) -> None:
-    """Who does not belong is refused meanwhile, and a ground station beside the leading computer hears everybody."""
+    """Encrypted. Who does not belong is refused, and a ground station beside the leading computer hears everybody."""
+    keys, foreign = str(tmp_path / "keys"), str(tmp_path / "foreign")
+    for folder in (keys, foreign):
+        made = ftcc("keys", "mesh", folder, "--swarm", "test", "--uavs", "1-8", *(f"--node={name}" for name in "abc"))
+        assert made.returncode == 0, made.stderr
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", free_port()))
         station.settimeout(5.0)
         mavlink = f"127.0.0.1:{station.getsockname()[1]}"
         asked = ("containment", "--duration", "4", "--seed", "5", "--variant", "loss30")
-        flight = fly(*asked, "--speed", "max", "--pack", "2", "--nodes", str(plan), "--insecure", "--mavlink", mavlink)
+        flight = fly(*asked, "--speed", "max", "--pack", "2", "--nodes", str(plan), "--tls", keys, "--mavlink", mavlink)
         flight.wait_until(lambda: "waiting for node b" in flight.output)
         strangers = [
-            (node("c"), "refused: there is no node 'c' in the plan; it has a, b"),
-            (node("b", "demo"), "refused: it is to fly demo, the swarm flies containment"),
-            (node("b", "--uavs", "5-6"), "refused: it is to fly vehicles 5-6, the plan has 5 there"),
+            (node("b", "demo", "--tls", keys), "refused: it is to fly demo, the swarm flies containment"),
+            (node("b", "--uavs", "5-6", "--tls", keys), "refused: it is to fly vehicles 5-6, the plan has 5 there"),
+            (node("d", "--tls", keys), "--tls"),
         ]
         for process, said in strangers:
             code, output = ended(process)
             assert code == 2, output
             assert said in output
-        here = [node("a"), node("b", "containment", "--uavs", "5", "--autopilots", "1,7")]
+        outside = [node("c", "--tls", keys), node("a", "--tls", foreign)]
+        flight.wait_until(lambda: "refused: does not accept our authority" in flight.output)
+        flight.wait_until(lambda: "node-c at 127.0.0.1 refused: has no rights here" in flight.output)
+        here = [node("a", "--tls", keys), node("b", "containment", "--uavs=5", "--autopilots=1,7", "--tls", keys)]
         assert flight.wait() == 0, flight.output
         assert [ended(process)[0] for process in here] == [0, 0]
+        for process in outside:
+            assert process.poll() is None, process.communicate()
+            process.send_signal(signal.SIGINT)
+            assert "joined" not in ended(process)[1]
         codec, heard = Codec(255, 190), set()
         while len(heard) < 8:
             heard |= {message.get_srcSystem() for message in codec.parse(station.recv(4096))}
