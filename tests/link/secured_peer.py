@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ftcc.link.mesh import Mesh
+from ftcc.link.mesh_door import Door
 from ftcc.link.mesh_refusals import _MOST, RefusalCounter
 from ftcc.link.mesh_security import Credentials, Rights, security, uav_access
 
@@ -65,6 +66,12 @@ class Peer:
         self.subscriber = self.mesh._session.declare_subscriber(
             hear, lambda sample: self.heard.append(f"{sample.key_expr} {bytes(sample.payload).decode()}")
         )
+
+    def door(self, port: int, addresses: list[str]) -> None:
+        self.way_in = Door(port, addresses)
+
+    def dropped(self) -> int:
+        return self.way_in.dropped
 
     def all_heard(self) -> list[str]:
         return self.heard

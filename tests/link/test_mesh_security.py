@@ -270,6 +270,25 @@ def test_a_flood_needs_neither_memory_nor_log_and_holds_up_no_link(start, keys):
     assert one.log.stat().st_size < 10_000
 
 
+def test_a_flood_of_strangers_does_not_keep_new_links_waiting(start, keys):
+    """Behind a door; without it UAV 2 would wait for 0.1 s per stranger."""
+    one, two = start(), start()
+    port, good = free_port(), str(keys / "good")
+    one("open", keys=good, name="uav-1", own=1, hears=[2], heard_by=[2], listen=port)
+    one("door", port=port, addresses=["127.0.0.1"])
+    strangers = [socket.socket() for _ in range(300)]
+    for stranger in strangers:
+        stranger.setblocking(False)
+        stranger.bind(("127.0.0.2", 0))
+        stranger.connect_ex(("127.0.0.1", port))
+    two("open", keys=good, name="uav-2", own=2, hears=[1], heard_by=[1], connect=[port])
+    assert one("wait_until_ready", seconds=10.0)
+    for stranger in strangers:
+        stranger.close()
+    assert one("dropped") >= len(strangers)
+    assert one("refused", seconds=0.3) == []
+
+
 def test_nobody_waits_for_a_counter_that_is_not_asked(start, keys):
     """Zenoh's lines about 10 000 messages are more than the pipe holds."""
     one, two = start(), start()
