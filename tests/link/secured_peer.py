@@ -10,10 +10,10 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from ftcc.link.mesh import Mesh
+from ftcc.link.mesh import Mesh, configuration, import_zenoh
 from ftcc.link.mesh_door import Door
 from ftcc.link.mesh_refusals import _MOST, RefusalCounter
-from ftcc.link.mesh_security import Credentials, Rights, security, uav_access
+from ftcc.link.mesh_security import Credentials, Rights, lead_access, node_access, security, uav_access
 
 SWARM = "run"
 
@@ -66,6 +66,51 @@ class Peer:
         self.subscriber = self.mesh._session.declare_subscriber(
             hear, lambda sample: self.heard.append(f"{sample.key_expr} {bytes(sample.payload).decode()}")
         )
+
+    def open_plane(
+        self,
+        *,
+        keys: str,
+        name: str,
+        nodes: list[str],
+        listen: int = 0,
+        connect: tuple[int, ...] = (),
+        lawless: bool = False,
+    ) -> None:
+        """A session of a node or of the lead, which hears and answers what the others of the control plane say."""
+        zenoh = import_zenoh()
+        credentials = Credentials(Path(keys), name)
+        swarm, lead = credentials.swarm, name == "lead"
+        others = lead_access(swarm, nodes) if lead else node_access(swarm, name.removeprefix("node-"), nodes)
+        self.refusals = RefusalCounter(others)
+        here = "tls/127.0.0.1:{}".format
+        secured = security(credentials, others)
+        if lawless:
+            del secured["access_control"]
+        config = configuration(zenoh, here(listen) if listen else None, map(here, connect), 1.0, secured)
+        self.session = zenoh.open(config)
+        self.refusals.watch(self.session)
+        self.heard = []
+
+        def hear(sample: Any) -> None:
+            self.heard.append(f"{sample.key_expr} {bytes(sample.payload).decode()}")
+
+        asked = f"ftcc/{swarm}/node/**" if lead else f"ftcc/{swarm}/lead/**"
+        own = f"ftcc/{swarm}/lead" if lead else f"ftcc/{swarm}/node/{name.removeprefix('node-')}"
+        self.kept = [
+            self.session.declare_subscriber(asked, hear),
+            self.session.liveliness().declare_subscriber(
+                asked, lambda sample: self.heard.append(f"{sample.key_expr} {sample.kind}"), history=True
+            ),
+            self.session.liveliness().declare_token(f"{own}/alive"),
+            self.session.declare_queryable(f"{own}/ask", lambda query: query.reply(query.key_expr, f"{name} answers")),
+        ]
+
+    def plane_put(self, key: str, text: str) -> None:
+        self.session.put(key, text.encode())
+
+    def plane_get(self, key: str) -> list[str]:
+        return [bytes(reply.ok.payload).decode() for reply in self.session.get(key, timeout=1.0) if reply.ok]
 
     def door(self, port: int, addresses: list[str]) -> None:
         self.way_in = Door(port, addresses)

@@ -2,81 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import socket
 import ssl
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ftcc.link.mesh_authority import add_certificates, new_authority
+from ftcc.link.mesh_authority import add_certificates
 from ftcc.link.mesh_refusals import Refusal
 from ftcc.link.mesh_security import Credentials, MeshKeysError, access_control, lead_access, node_access, uav_access
+from tests.link.secured import Process
 from tests.support.ports import free_port
-
-
-class Process:
-    """A peer's process; every call waits for its answer."""
-
-    def __init__(self, log: Path) -> None:
-        self.log = log
-        with log.open("w") as file:
-            self._process = subprocess.Popen(
-                [sys.executable, str(Path(__file__).with_name("secured_peer.py"))],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=file,
-                text=True,
-            )
-
-    def __call__(self, command: str, /, **arguments: Any) -> Any:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps([command, arguments]) + "\n")
-        self._process.stdin.flush()
-        answer = self._process.stdout.readline()
-        assert answer, f"the peer died of {command}: {self.log.read_text()}"
-        return json.loads(answer)
-
-    def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
-            pipe.close()
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[[], Process]]:
-    processes: list[Process] = []
-
-    def one() -> Process:
-        processes.append(Process(tmp_path / f"{len(processes)}.log"))
-        return processes[-1]
-
-    yield one
-    for process in processes:
-        process.kill()
-
-
-@pytest.fixture(scope="module")
-def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of folders: good, foreign, and copies of the good one in which UAV 2's certificate is out of time."""
-    root = tmp_path_factory.mktemp("keys")
-    for folder in ("good", "foreign"):
-        new_authority(root / folder, "demo")
-        add_certificates(root / folder, ["uav-1", "uav-2", "uav-3", "uav-7", "node-a", "lead"])
-    for folder, begin, days in (("expired", 0.0, -0.01), ("early", 1.0, 1.0)):
-        shutil.copytree(root / "good", root / folder)
-        add_certificates(root / folder, ["uav-2"], days=days, begin_days=begin, renew=True)
-    return root
 
 
 def open_pair(one: Process, two: Process, keys: Path) -> int:
