@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.defence.arrays import Edge as Standing
 from ftcc.airside.flight_path import Own
 from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE
 from ftcc.airside.link_events import set_links
@@ -46,9 +47,11 @@ _publish = stages.publish
 
 _V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
 
+_STANDING = Standing._fields.index("standing")
 _SENDER = Edge._fields.index("sender")
-_REPORT = len(LINK_COLUMNS) - len(LINK_REPORT)
+_REPORT = [column.name for column in LINK_COLUMNS].index(LINK_REPORT[0])
 """Where the report on a link begins in a row of its recording."""
+_TRUST = [column.name for column in LINK_COLUMNS].index("trust")
 
 _DATAGRAMS = 64
 """Read of one vehicle at a time, at most: a flood must not hold up the others for ever."""
@@ -219,6 +222,7 @@ def record(group, timing, i, now_us):
             row[0], row[1] = now_us / 1e6, float(group.wire.system[i])
             row[2] = float(group.inbox.edges[i, edge, _SENDER])
             report_link(group.inbox, i, edge, row[_REPORT:])
+            row[_TRUST] = group.autopilots.defence.edges[i, edge, _STANDING]
             links.filled[i] += 1
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.defence.arrays import GIVEN, ON, TRUST
 from ftcc.airside.defence.stage import defend
 from ftcc.airside.flight_path import Own, decode_state
 from ftcc.airside.lateral_hold import hold_course
@@ -94,8 +95,9 @@ def _is_finite(values, count, largest):
 def _heard_by(autopilots, inbox, i):
     n = inbox.degree[i] if autopilots.mode[i] != HOLD else 0
     defence = autopilots.defence
-    values = inbox.values[i, :n] if defence.on[0] == 0 else defence.values[i, :n]
-    heard = Heard(values, inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n], defence.trust[i, :n])
+    values = inbox.values[i, :n] if defence.switches[ON] == 0 else defence.heard[GIVEN, i, :n]
+    trust = defence.heard[TRUST, i, :n]
+    heard = Heard(values, inbox.age[i, :n], inbox.valid[i, :n], autopilots.weight[i, :n], trust)
     return _heard_by_law(autopilots, i, heard)
 
 
@@ -213,7 +215,7 @@ def control(autopilots, inbox, i, dt):
     if the law gives a command, a state or a value to share that is not finite.
     """
     autopilots.stepping[0] = i
-    if autopilots.defence.on[0] == 1:
+    if autopilots.defence.switches[ON] == 1:
         _defend(autopilots, inbox, i, dt)
     reference = fields(_Reference, autopilots.reference[i])
     gains = fields(_Gains, autopilots.gains[i])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable
 
-__all__ = ["CUT", "FIRE", "FRESH", "GRAY", "HEALTH_COLORS", "STALE", "Color", "colors", "hexadecimal"]
+__all__ = ["CUT", "DOUBTED", "FIRE", "FRESH", "GRAY", "HEALTH_COLORS", "STALE", "Color", "colors", "hexadecimal"]
 
 Color = tuple[int, int, int]
 
@@ -15,6 +15,8 @@ FRESH: Color = (122, 134, 126)
 STALE: Color = (224, 160, 20)
 CUT: Color = (226, 48, 48)
 """Links with fresh records, with none lately, and cut ones."""
+DOUBTED: Color = (150, 84, 206)
+"""Links whose receiver distrusts the sender."""
 FIRE: Color = (222, 84, 40)
 
 HEALTH_COLORS: tuple[Color, ...] = ((84, 170, 92), STALE, (230, 110, 30), CUT, GRAY)

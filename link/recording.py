@@ -71,6 +71,7 @@ LINK_COLUMNS = (
     Column("lost", "-", "records that the channel lost so far"),
     Column("age", "s", "mean age of what was heard last, since the row before"),
     Column("oldest", "s", "greatest age of what was heard last, since the row before"),
+    Column("trust", "-", "share of its weight that the receiver's defences leave the sender; 1: not doubted"),
 )
 """Of the links' part of the recording: a row per in-edge and second."""
 

@@ -13,7 +13,22 @@ from ftcc.airside.defence.gains import DefenceGains
 from ftcc.airside.scheme import Scheme, rates_of
 from ftcc.airside.spec import AutopilotSpec
 
-__all__ = ["NOT_TOLD", "Column", "Defence", "Edge", "columns_of", "new_defence"]
+__all__ = [
+    "CARRIED",
+    "GIVEN",
+    "LAST",
+    "LEADS",
+    "NOT_TOLD",
+    "ON",
+    "TRUST",
+    "TRUSTED",
+    "VALUE",
+    "Column",
+    "Defence",
+    "Edge",
+    "columns_of",
+    "new_defence",
+]
 
 NOT_TOLD, VALUE = -2, -1
 """`Column.rate_of`, where a role does not share the value, and where it is the rate of nothing."""
@@ -48,35 +63,33 @@ class Edge(NamedTuple):
     """1 from where it was announced as such."""
 
 
-class Defence(NamedTuple):
-    """Of k autopilots."""
+ON, CARRIED = range(2)
+"""Entries of ``Defence.switches``."""
+LEADS, TRUSTED = range(2)
+"""Columns of ``Defence.known``."""
+LAST, GIVEN, TRUST = range(3)
+"""First index of ``Defence.heard``."""
 
-    on: NDArray[np.int64]
-    """(1,): 1 in a swarm with ``[defence]``."""
+
+class Defence(NamedTuple):
+    """Of k autopilots. Few arrays: each costs time where a law is compiled."""
+
+    switches: NDArray[np.int64]
+    """(2,): 1 in a swarm with ``[defence]``; 1 where the law carries what it hears to the present, 0 where it uses
+    values as they were told."""
     gains: NDArray[np.float64]
     """(k, g): see `DefenceGains`."""
     columns: NDArray[np.int64]
     """(2, m, 3): see `Column`; first what followers share, then leaders."""
-    carried: NDArray[np.float64]
-    """(1,): 1 where the law carries what it hears to the present, 0 where it uses values as they were told."""
-    leads: NDArray[np.int64]
-    """(k, n): 1 where the in-neighbour is a leader."""
-    trusted: NDArray[np.int64]
-    """(k, n): 1 where it is trusted whatever it tells."""
+    known: NDArray[np.int64]
+    """(k, n, 2): of each in-neighbour, 1 where it is a leader, and where it is trusted whatever it tells."""
     shared_at: NDArray[np.float64]
     """(k,): instant of ``Autopilots.shared``, s; nan before the first."""
     edges: NDArray[np.float64]
     """(k, n, 5): see `Edge`."""
-    last: NDArray[np.float64]
-    """(k, n, m): the last record."""
-    values: NDArray[np.float64]
-    """(k, n, m): what the law gets of what was heard."""
-    trust: NDArray[np.float64]
-    """(k, n, m): share of its weight that each value keeps; 1 while nothing is doubted."""
-    full: NDArray[np.float64]
-    """(k, 1, m): trust in a virtual leader."""
-    told: NDArray[np.float64]
-    """(n, m): scratch for what the neighbours of a UAV told."""
+    heard: NDArray[np.float64]
+    """(3, k, n, m): the last record that was looked at; what the law is given; the share of its weight that each value
+    keeps, 1 while nothing is doubted."""
     off_crowd: NDArray[np.float64]
     """(n, m): scratch for how far each value is off the neighbours' median."""
     scratch: NDArray[np.float64]
@@ -99,28 +112,23 @@ def columns_of(scheme: Scheme, values: int) -> NDArray[np.int64]:
 def new_defence(specs: Sequence[AutopilotSpec], scheme: Scheme, edges: int, values: int) -> Defence:
     """Before the first tick, when nobody is doubted; at most ``edges`` in-edges, records of ``values`` numbers."""
     k = len(specs)
-    leads, trusted = np.zeros((k, edges), np.int64), np.zeros((k, edges), np.int64)
-    for i, spec in enumerate(specs):
-        senders = [neighbour.uav for neighbour in spec.neighbours]
-        leads[i, : len(senders)] = [uav in spec.defence.leaders for uav in senders]
-        trusted[i, : len(senders)] = [uav in spec.defence.trusted for uav in senders]
+    known = np.zeros((k, edges, 2), np.int64)
+    for row, spec in zip(known, specs, strict=True):
+        for edge, neighbour in enumerate(spec.neighbours):
+            row[edge] = neighbour.uav in spec.defence.leaders, neighbour.uav in spec.defence.trusted
     remembered = np.empty((k, edges, len(Edge._fields)))
     remembered[:] = Edge(math.nan, -math.inf, 1.0, 1.0, 0.0)
+    heard = np.zeros((3, k, edges, values))
+    heard[TRUST] = 1.0
     off = (0.0,) * len(DefenceGains._fields)
     return Defence(
-        on=np.array([any(spec.defence.on for spec in specs)], np.int64),
+        switches=np.array([any(spec.defence.on for spec in specs), scheme.carries], np.int64),
         gains=np.array([spec.defence.gains or off for spec in specs], np.float64),
         columns=columns_of(scheme, values),
-        carried=np.array([float(scheme.carries)]),
-        leads=leads,
-        trusted=trusted,
+        known=known,
         shared_at=np.full(k, math.nan),
         edges=remembered,
-        last=np.zeros((k, edges, values)),
-        values=np.zeros((k, edges, values)),
-        trust=np.ones((k, edges, values)),
-        full=np.ones((k, 1, values)),
-        told=np.zeros((edges, values)),
+        heard=heard,
         off_crowd=np.zeros((edges, values)),
         scratch=np.zeros((2, edges + 1)),
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from ftcc.airside.defence.arrays import TRUSTED
 from ftcc.link.compiled import compiled, compiled_apart
 
 __all__ = ["bounds", "is_extreme", "ranked"]
@@ -53,19 +54,19 @@ def ranked(distances, counts, n, rank):
 
 
 @compiled
-def bounds(distances, counts, trusted, n, F):
+def bounds(distances, counts, known, n, F):
     """Lower and upper bound of what at least one honest neighbour, or the own value, vouches for.
 
     From the (F + 1)-th smallest to the (F + 1)-th largest of the ``n`` values heard, extended to the own one (distance
-    0) and to those of ``trusted`` neighbours: with at most F liars among the others, the interval lies within the hull
-    of the honest values. The own value stands in it always, as in W-MSR. The idea of the trimmed hull: Vaidya, Tseng,
-    Liang, "Iterative approximate Byzantine consensus in arbitrary directed graphs", PODC 2012; to clip a value into it
-    instead of leaving it out is ours.
+    0) and to those of trusted neighbours (``known``, see `Defence`): with at most F liars among the others, the
+    interval lies within the hull of the honest values. The own value stands in it always, as in W-MSR. The idea of the
+    trimmed hull: Vaidya, Tseng, Liang, "Iterative approximate Byzantine consensus in arbitrary directed graphs", PODC
+    2012; to clip a value into it instead of leaving it out is ours.
     """
     low, high, others = 0.0, 0.0, 0
     for j in range(n):
         if counts[j] > 0.0:
-            if trusted[j] == 1:
+            if known[j, TRUSTED] == 1:
                 low, high = min(low, distances[j]), max(high, distances[j])
                 counts[j] = -1.0
             else:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 
-from ftcc.airside.defence.arrays import VALUE, Column, Edge
+from ftcc.airside.defence.arrays import CARRIED, GIVEN, LAST, LEADS, TRUST, TRUSTED, VALUE, Column, Edge
 from ftcc.airside.defence.credibility import ANGLE, judge_record, say_of
 from ftcc.airside.defence.events import BANNED, EXTREME, SURPRISING, note_standing
 from ftcc.airside.defence.gains import DefenceGains
 from ftcc.airside.defence.resilient import bounds, is_extreme, ranked
-from ftcc.link.compiled import compiled, compiled_apart, copy, fields
+from ftcc.link.compiled import compiled_apart, compiled_within, copy, fields
 from ftcc.link.rotation import wrapped
 
 __all__ = ["defend"]
@@ -22,7 +22,7 @@ _STAMP, _BANNED, _STANDING = (Edge._fields.index(name) for name in ("stamp", "ba
 _FOLLOWER = 0
 
 
-@compiled_apart
+@compiled_within
 def _measure(d, i, n, m, values, age, valid, shared, horizon, now):
     """Set ``scratch``: how far each neighbour's value in column ``m`` is off the own one, and whether it takes part.
 
@@ -33,28 +33,28 @@ def _measure(d, i, n, m, values, age, valid, shared, horizon, now):
     distances, counts = d.scratch[0], d.scratch[1]
     is_value = own_column[_RATE_OF] == VALUE
     own = shared[m]
-    if is_value and own_column[_RATE] >= 0 and d.carried[0] > 0.0:
+    if is_value and own_column[_RATE] >= 0 and d.switches[CARRIED] == 1:
         own += shared[own_column[_RATE]] * (now - d.shared_at[i])
     for j in range(n):
-        column = d.columns[d.leads[i, j], m]
+        column = d.columns[d.known[i, j, LEADS], m]
         counts[j], distances[j] = 0.0, math.nan
         if valid[j] == 0.0 or column[_RATE_OF] != own_column[_RATE_OF]:
             continue
         value = values[j, m]
         if is_value and column[_RATE] >= 0:
             value += values[j, column[_RATE]] * _carried_for(d, age[j], horizon)
-        counts[j], distances[j] = 1.0 if d.trust[i, j, m] > 0.0 else 0.0, value - own
+        counts[j], distances[j] = 1.0 if d.heard[TRUST, i, j, m] > 0.0 else 0.0, value - own
         if own_column[_UNIT] == ANGLE:
             distances[j] = wrapped(distances[j])
 
 
-@compiled
+@compiled_within
 def _carried_for(d, age, horizon):
     """Time over which a record of this age is carried to the present, s."""
-    return min(age, horizon) if d.carried[0] > 0.0 else 0.0
+    return min(age, horizon) if d.switches[CARRIED] == 1 else 0.0
 
 
-@compiled
+@compiled_within
 def _judge(d, i, n, values, age, valid, stamp, shared, gains, now):
     """Look at the records that are new, and set what they leave each neighbour of its say."""
     knows_itself = d.shared_at[i] == d.shared_at[i]
@@ -73,30 +73,30 @@ def _judge(d, i, n, values, age, valid, stamp, shared, gains, now):
                 _set_off_crowd(d, n, m)
     for j in range(n):
         if _is_new(d, i, j, stamp[j]):
-            columns, at = d.columns[d.leads[i, j]], stamp[j] / 1e6
-            judge_record(d.gains[i], columns, d.edges[i, j], d.last[i, j], values[j], at, d.off_crowd[j], now)
+            columns, at = d.columns[d.known[i, j, LEADS]], stamp[j] / 1e6
+            judge_record(d.gains[i], columns, d.edges[i, j], d.heard[LAST, i, j], values[j], at, d.off_crowd[j], now)
             _set_say(d, i, j, age[j], valid[j], gains, now)
 
 
-@compiled
+@compiled_within
 def _is_new(d, i, j, stamp):
     """Whether the record with this stamp, us, has not been looked at yet; before the first the stamp is negative."""
     return stamp >= 0 and stamp / 1e6 != d.edges[i, j, _STAMP]
 
 
-@compiled
+@compiled_within
 def _set_say(d, i, j, age, valid, gains, now):
     """Set what ban, credit and age leave neighbour ``j`` of its say; who has not been heard yet is not doubted."""
     say = 1.0
-    if d.trusted[i, j] == 0 and valid > 0.0:
+    if d.known[i, j, TRUSTED] == 0 and valid > 0.0:
         say = say_of(d.edges[i, j], now)
         if gains.oldest > 0.0 and age > gains.oldest:
             say = 0.0
-    for m in range(d.trust.shape[2]):
-        d.trust[i, j, m] = say
+    for m in range(d.off_crowd.shape[1]):
+        d.heard[TRUST, i, j, m] = say
 
 
-@compiled
+@compiled_within
 def _set_off_crowd(d, n, m):
     """Set how far each value in ``scratch`` is off the median of all, the own one among them."""
     distances, counts = d.scratch[0], d.scratch[1]
@@ -109,39 +109,39 @@ def _set_off_crowd(d, n, m):
         d.off_crowd[j, m] = distances[j] - middle if distances[j] == distances[j] else 0.0
 
 
-@compiled
-def _clip(d, i, n, m, age, gains):
+@compiled_within
+def _clip(d, i, n, m, values, age, gains):
     """Move the values in column ``m``, which ``scratch`` holds, into the hull of what the majority tells.
 
     A value whose rate has been moved before is corrected by what the law will carry it on less, or more.
     """
     distances, counts = d.scratch[0], d.scratch[1]
-    low, high = bounds(distances, counts, d.trusted[i], n, gains.hull)
+    low, high = bounds(distances, counts, d.known[i], n, gains.hull)
     for j in range(n):
-        if counts[j] > 0.0 and d.trusted[i, j] == 0:
-            d.values[i, j, m] += min(max(distances[j], low), high) - distances[j]
-            rate, column = d.columns[d.leads[i, j], m, _RATE], d.columns[d.leads[i, j], m]
+        if counts[j] > 0.0 and d.known[i, j, TRUSTED] == 0:
+            d.heard[GIVEN, i, j, m] += min(max(distances[j], low), high) - distances[j]
+            rate, column = d.columns[d.known[i, j, LEADS], m, _RATE], d.columns[d.known[i, j, LEADS], m]
             if rate >= 0 and column[_RATE_OF] == VALUE:
-                moved = d.values[i, j, rate] - d.told[j, rate]
-                d.values[i, j, m] -= moved * _carried_for(d, age[j], gains.horizon)
+                moved = d.heard[GIVEN, i, j, rate] - values[j, rate]
+                d.heard[GIVEN, i, j, m] -= moved * _carried_for(d, age[j], gains.horizon)
 
 
-@compiled
+@compiled_within
 def _reduce(d, i, n, m, gains):
     """Leave out the F most extreme values of column ``m``, which ``scratch`` holds, and their rates."""
     distances, counts = d.scratch[0], d.scratch[1]
     for j in range(n):
-        if d.trusted[i, j] == 1:
+        if d.known[i, j, TRUSTED] == 1:
             counts[j] = 0.0
     for j in range(n):
         if counts[j] > 0.0 and is_extreme(distances, counts, n, j, gains.F):
             at = m
             while at >= 0:
-                d.trust[i, j, at] = 0.0
-                at = d.columns[d.leads[i, j], at, _RATE]
+                d.heard[TRUST, i, j, at] = 0.0
+                at = d.columns[d.known[i, j, LEADS], at, _RATE]
 
 
-@compiled
+@compiled_within
 def _note_standings(d, i, n, valid, gains, events, now, dt):
     """Bring the standing of the neighbours to this tick, and note who begins or ceases to be distrusted."""
     share = min(dt / gains.memory, 1.0)
@@ -149,10 +149,10 @@ def _note_standings(d, i, n, valid, gains, events, now, dt):
         if valid[j] == 0.0:
             continue
         edge, left = d.edges[i, j], 1.0
-        columns = d.columns[d.leads[i, j]]
+        columns = d.columns[d.known[i, j, LEADS]]
         for m in range(columns.shape[0]):
             if columns[m, _RATE_OF] == VALUE:
-                left = min(left, d.trust[i, j, m])
+                left = min(left, d.heard[TRUST, i, j, m])
         edge[_STANDING] += (left - edge[_STANDING]) * share
         reason = EXTREME
         if now < edge[_BANNED]:
@@ -164,7 +164,9 @@ def _note_standings(d, i, n, valid, gains, events, now, dt):
 
 @compiled_apart
 def defend(d, i, n, values, age, valid, stamp, shared, events, now, dt):
-    """Set ``values`` and ``trust`` of ``d`` for the ``n`` in-neighbours of UAV ``i`` from what it has heard.
+    """Set what the law of UAV ``i`` is given of what it has heard from ``n`` in-neighbours, and its trust in that.
+
+    Both stand in ``d.heard`` then, see `Defence`.
 
     Parameters
     ----------
@@ -176,8 +178,7 @@ def defend(d, i, n, values, age, valid, stamp, shared, events, now, dt):
     """
     gains = fields(DefenceGains, d.gains[i])
     for j in range(n):
-        copy(values[j], d.values[i, j])
-        copy(values[j], d.told[j])
+        copy(values[j], d.heard[GIVEN, i, j])
     _judge(d, i, n, values, age, valid, stamp, shared, gains, now)
     if d.shared_at[i] == d.shared_at[i]:
         # Rates first: a value is moved by where its rate will carry it.
@@ -189,7 +190,7 @@ def defend(d, i, n, values, age, valid, stamp, shared, events, now, dt):
                 if gains.hull > 0.0 or (gains.F > 0.0 and not rates):
                     _measure(d, i, n, m, values, age, valid, shared, gains.horizon, now)
                 if gains.hull > 0.0:
-                    _clip(d, i, n, m, age, gains)
+                    _clip(d, i, n, m, values, age, gains)
                 if gains.F > 0.0 and not rates:
                     _reduce(d, i, n, m, gains)
     _note_standings(d, i, n, valid, gains, events, now, dt)

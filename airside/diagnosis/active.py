@@ -49,8 +49,7 @@ def heard_by_law(autopilots, i, heard):
     """What the law of UAV ``i`` hears: its neighbours, ``heard``, or a virtual leader in their place."""
     if hears_virtual_leader(autopilots, i):
         c = autopilots.cooperation
-        full = autopilots.defence.full[i]
-        return Heard(c.records[i], c.edges[i, 0], c.edges[i, 1], c.edges[i, 2], full)
+        return Heard(c.records[i], c.edges[i, 0], c.edges[i, 1], c.edges[i, 2], c.trust[i])
     return heard
 
 

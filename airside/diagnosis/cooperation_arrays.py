@@ -85,6 +85,8 @@ class Cooperation(NamedTuple):
     """(k, 1, m): what the virtual leader shares."""
     edges: NDArray[np.float64]
     """(k, 3, 1): age (s), validity and weight of that record."""
+    trust: NDArray[np.float64]
+    """(k, 1, m): trust in its values."""
 
 
 def new_cooperation(
@@ -129,4 +131,5 @@ def new_cooperation(
         level=level,
         records=np.zeros((k, 1, shared)),
         edges=edges,
+        trust=np.ones((k, 1, shared)),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftcc.airside.autopilots import Autopilots
+from ftcc.airside.defence.arrays import ON
 from ftcc.airside.link_events import LinkEvents
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.spec import AutopilotSpec
@@ -70,6 +71,11 @@ class AutopilotView:
         """Whether it diagnoses its own actuators."""
         diagnosis = self.autopilots.diagnosis
         return diagnosis is not None and bool(diagnosis.on[self.i])
+
+    @property
+    def defended(self) -> bool:
+        """Whether it defends itself against what neighbours tell."""
+        return not self.leader and bool(self.autopilots.defence.switches[ON])
 
     @property
     def home(self) -> Home:

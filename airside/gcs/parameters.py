@@ -8,24 +8,27 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ftcc.airside.defence.gains import DEFENCE_RANGES, DefenceGains
 from ftcc.airside.diagnosis.gains import DIAGNOSIS_RANGES, DiagnosisGains
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.schedule import SLOWEST
 from ftcc.airside.gcs.streams import STREAMS
 from ftcc.airside.gcs.telemetry import Telemetry
+from ftcc.airside.ranges import Range
 from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, Quantity, quantities
 from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
 from ftcc.link.mavlink import as_typed, dialect
 
-__all__ = ["Parameter", "Parameters", "RefusedError", "diagnosis_parameter"]
+__all__ = ["Parameter", "Parameters", "RefusedError", "defence_parameter", "diagnosis_parameter"]
 
 _INTEGER = dialect.MAV_PARAM_TYPE_INT32
 _FLOAT = dialect.MAV_PARAM_TYPE_REAL32
@@ -76,6 +79,7 @@ class Parameters:
             *_rates(view, telemetry),
             *_gains(view),
             *_diagnosis(view),
+            *_defence(view),
         ]
         self._all = sorted(own, key=lambda parameter: parameter.name)
         self._index = {parameter.name.upper(): n for n, parameter in enumerate(self._all)}
@@ -249,7 +253,7 @@ def _rates(view: AutopilotView, telemetry: Telemetry) -> Iterator[Parameter]:
 
         return Parameter(f"SR_{name}", lambda: telemetry.default_rate(n), write, 0.0, 1000.0, meaning="Hz, 0: silent")
 
-    return (one(n, stream.name) for n, stream in enumerate(STREAMS) if view.diagnosed or not stream.diagnosed_only)
+    return (one(n, stream.name) for n, stream in enumerate(STREAMS) if stream.known_to(view))
 
 
 def _gains(view: AutopilotView) -> Iterator[Parameter]:
@@ -319,16 +323,39 @@ def diagnosis_parameter(setting: str) -> str:
     return f"FDI_{setting.upper()}"
 
 
+def defence_parameter(setting: str) -> str:
+    """Name of the parameter of a setting of the defences: ``DEF_JUMP_SPEED`` for ``jump_speed``."""
+    return f"DEF_{setting.upper()}"
+
+
 def _diagnosis(view: AutopilotView) -> Iterator[Parameter]:
     """Settings of fault detection and isolation, and of making room, where the swarm diagnoses its faults."""
     diagnosis = view.autopilots.diagnosis
     if diagnosis is None:
         return
-    in_force = diagnosis.gains[view.i]
-    ranges = {name: allowed for allowed, names in DIAGNOSIS_RANGES.items() for name in names.split()}
+    names = [name for name in DiagnosisGains._fields if name in _OF_LEADERS or not view.leader]
+    yield from _settings(DiagnosisGains, DIAGNOSIS_RANGES, diagnosis.gains[view.i], names, diagnosis_parameter)
+
+
+def _defence(view: AutopilotView) -> Iterator[Parameter]:
+    """Settings of the defences, where the swarm has any."""
+    if view.defended:
+        gains = view.autopilots.defence.gains[view.i]
+        yield from _settings(DefenceGains, DEFENCE_RANGES, gains, DefenceGains._fields, defence_parameter)
+
+
+def _settings(
+    record: Any,
+    allowed_values: Mapping[Range, str],
+    in_force: NDArray[np.float64],
+    names: Sequence[str],
+    announced_as: Callable[[str], str],
+) -> Iterator[Parameter]:
+    """Settings that stand in ``in_force`` in the order of ``record``."""
+    ranges = {name: allowed for allowed, names in allowed_values.items() for name in names.split()}
 
     def one(n: int, name: str, note: Quantity) -> Parameter:
-        announced, allowed = diagnosis_parameter(name), ranges[name]
+        announced, allowed = announced_as(name), ranges[name]
 
         def write(value: float) -> None:
             if refusal := allowed.refusal(value):
@@ -342,6 +369,6 @@ def _diagnosis(view: AutopilotView) -> Iterator[Parameter]:
             announced, read, write, allowed.least, min(allowed.most, _ANY), meaning=f"{note.meaning}, {note.unit}"
         )
 
-    for n, (name, note) in enumerate(quantities(DiagnosisGains).items()):
-        if name in _OF_LEADERS or not view.leader:
+    for n, (name, note) in enumerate(quantities(record).items()):
+        if name in names:
             yield one(n, name, note)

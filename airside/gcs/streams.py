@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ftcc.airside.defence.arrays import Edge as Standing
 from ftcc.airside.diagnosis.beliefs import SENSOR, UNDETERMINED, Belief, new_health
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import whole
@@ -43,6 +44,10 @@ BELIEF_FIELDS = Belief._fields[: Belief._fields.index("suspected_at")]
 _M = dialect
 _RATES, _POSITION = (StateMessage._fields.index(name) for name in ("rollspeed", "x"))
 _RECEIVED, _LOST = (Edge._fields.index(name) for name in ("received", "lost"))
+_SENDER = Edge._fields.index("sender")
+_STANDING = Standing._fields.index("standing")
+_MOST_TRUSTS = 29
+"""Pairs of sender and trust in an array."""
 _BLOCKED = Channel._fields.index("blocked")
 
 
@@ -280,6 +285,14 @@ def _links(view: AutopilotView) -> Any:
     return float_array(view.now_us, "links", values)
 
 
+def _trust(view: AutopilotView) -> Any:
+    defence, inbox, i = view.autopilots.defence, view.inbox, view.i
+    values: list[float] = []
+    for edge in range(min(int(inbox.degree[i]), _MOST_TRUSTS)):
+        values += [float(inbox.edges[i, edge, _SENDER]), float(defence.edges[i, edge, _STANDING])]
+    return float_array(view.now_us, "trust", values)
+
+
 def _home_position(view: AutopilotView) -> Any:
     latitude, longitude = view.home.place(0.0, 0.0)
     altitude = whole(view.home.altitude * 1e3, 32)
@@ -305,9 +318,16 @@ class Stream(NamedTuple):
     logged: float = 0.0
     """Hz of simulated time that the station has at least, also where the swarm flies faster than the clock."""
 
+    defended_only: bool = False
+    """Only of UAVs that defend themselves against what neighbours tell."""
+
     def of(self, view: AutopilotView) -> bool:
         """Whether a UAV has it."""
-        return not (self.followers_only and view.leader) and (view.diagnosed or not self.diagnosed_only)
+        return not (self.followers_only and view.leader) and self.known_to(view)
+
+    def known_to(self, view: AutopilotView) -> bool:
+        """Whether a UAV of this kind of swarm can have it."""
+        return (view.diagnosed or not self.diagnosed_only) and (view.defended or not self.defended_only)
 
 
 STREAMS = (
@@ -326,6 +346,7 @@ STREAMS = (
     Stream("SIGNALS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 10.0, _signals, followers_only=True),
     Stream("BELIEFS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 2.0, 0.0, _beliefs, diagnosed_only=True),
     Stream("LINKS", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 1.0, 10.0, _links),
+    Stream("TRUST", _M.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY, 1.0, 2.0, _trust, defended_only=True),
     Stream("HOME", _M.MAVLINK_MSG_ID_HOME_POSITION, 0.5, 0.0, _home_position),
 )
 """Everything that flows of itself, beside HEARTBEAT, in the order in which it is sent: a fix before positions."""

@@ -72,27 +72,30 @@ def _say(text: str) -> None:
     terminal().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def _faults_and_beliefs(name: str) -> dict[int, tuple[str, str]]:
-    """Of each UAV that diagnoses its actuators the faults that it has, and those that it believes to have."""
-    from ftcc.groundside.dashboard import describe_beliefs, describe_faults, watch_swarm
+def _faults_and_beliefs(name: str) -> tuple[dict[int, tuple[str, str]], dict[int, str]]:
+    """Of each UAV that diagnoses its actuators the faults that it has, and those that it believes to have; and of each
+    UAV, whom it distrusts, where anybody does."""
+    from ftcc.groundside.dashboard import describe_beliefs, describe_distrust, describe_faults, watch_swarm
 
     try:
         snapshot = next(watch_swarm(name, _SNAPSHOT_TIMEOUT), None)
     except OSError:
         # The swarm's station is busy or has ended: the UAVs answer for themselves.
-        return {}
+        return {}, {}
     uavs = snapshot.uavs if snapshot else {}
     words = {}
     for uav, state in uavs.items():
         if believed := describe_beliefs(state, state.effectiveness):
             words[uav] = (describe_faults(state) or "healthy", believed)
-    return words
+    doubts = {uav: describe_distrust(state).removeprefix("distrusts ") for uav, state in uavs.items()}
+    return words, doubts if any(doubts.values()) else {}
 
 
 def vehicles(swarm: Swarm = None, key: Key = None) -> None:
     """List the UAVs of a running swarm, with the UDP port and the present state of each.
 
-    Where they diagnose their actuators, also what faults each believes to have, beside those that it has.
+    Where they diagnose their actuators, also what faults each believes to have, beside those that it has; where one
+    distrusts another, whom.
     """
     from rich.table import Table
 
@@ -101,10 +104,12 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
     table = Table("UAV", "port", "role", "mode", "t, s", "altitude, m", "airspeed, m/s", "fault tolerance", box=None)
     silent = False
     with _station(swarm, key) as station:
-        words = _faults_and_beliefs(station.entry.name)
+        words, doubts = _faults_and_beliefs(station.entry.name)
         if words:
             table.add_column("has")
             table.add_column("believes")
+        if doubts:
+            table.add_column("distrusts")
         for uav, state in zip(station.uavs, station.vehicles(), strict=True):
             card = station.card(uav)
             if isinstance(state, NoAnswerError):
@@ -112,8 +117,9 @@ def vehicles(swarm: Swarm = None, key: Key = None) -> None:
                 silent = True
                 continue
             tolerance = {None: "", True: "on", False: "off"}[state.fault_tolerance]
+            said = [*(words.get(uav, ("", "")) if words else ()), *([doubts.get(uav, "")] if doubts else ())]
             numbers = (f"{state.t:.2f}", f"{state.altitude:.2f}", f"{state.airspeed:.2f}")
-            table.add_row(str(uav), str(card.port), state.role, state.mode, *numbers, tolerance, *words.get(uav, ()))
+            table.add_row(str(uav), str(card.port), state.role, state.mode, *numbers, tolerance, *said)
     terminal().print(table)
     if silent:
         raise typer.Exit(2)

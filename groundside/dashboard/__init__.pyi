@@ -2,6 +2,7 @@ from .dashboard import Dashboard as Dashboard
 from .feed import Feed as Feed
 from .feed import watch_swarm as watch_swarm
 from .labels import describe_beliefs as describe_beliefs
+from .labels import describe_distrust as describe_distrust
 from .labels import describe_faults as describe_faults
 from .replay import draw_run as draw_run
 from .replay import events_of as events_of

@@ -13,6 +13,7 @@ __all__ = [
     "LEFT",
     "believed_state",
     "describe_beliefs",
+    "describe_distrust",
     "describe_faults",
     "describe_silence",
     "faulty_actuators",
@@ -123,3 +124,13 @@ def describe_beliefs(uav: UavState, actuators: Iterable[str]) -> str:
             text += f" {100.0 * share:.0f} % {bias:+.2g}"
         words.append(text)
     return "; ".join(words) or STATES[HEALTHY]
+
+
+_LITTLE_TRUST = 0.5
+"""Below it a sender counts as distrusted."""
+
+
+def describe_distrust(uav: UavState) -> str:
+    """Whom a UAV distrusts, as "distrusts 2, 5"; empty: nobody."""
+    doubted = sorted(sender for sender, link in uav.links.items() if link.trust < _LITTLE_TRUST)
+    return f"distrusts {', '.join(map(str, doubted))}" if doubted else ""

@@ -16,13 +16,13 @@ from ftcc.groundside.dashboard.shapes import arrows
 from ftcc.groundside.dashboard.snapshot import LinkState, Snapshot, UavState
 from ftcc.groundside.dashboard.subject import Subject
 from ftcc.groundside.dashboard.viewer import Entry
-from ftcc.groundside.palette import CUT, FRESH, STALE, colors
+from ftcc.groundside.palette import CUT, DOUBTED, FRESH, STALE, colors
 from ftcc.link.graph import Graph
 
 __all__ = ["Links"]
 
-_FRESH, _STALE, _CUT = range(3)
-_TINTS = np.array([FRESH, STALE, CUT], np.uint8)
+_FRESH, _STALE, _DOUBTED, _CUT = range(4)
+_TINTS = np.array([FRESH, STALE, DOUBTED, CUT], np.uint8)
 """States of an edge, the best first, and their colours."""
 _NOTES = 8
 """Largest number of notes in the graph of a big swarm."""
@@ -30,6 +30,8 @@ _NOTE_OFFSET = 0.2
 """Distance of a note from its arrow; the circle of followers has radius 1."""
 _LOSSY = 0.01
 """Share of lost records from which an edge has a note."""
+_LITTLE_TRUST = 0.5
+"""Trust below which an edge is drawn as doubted."""
 _LOSS_MEMORY = 20.0
 """Time constant over which the loss is averaged, in snapshots; it follows changes within seconds."""
 
@@ -71,7 +73,7 @@ class Links:
         """Return the view of the graph."""
         return rrb.Spatial2DView(
             origin="/graph",
-            name="Links (amber stale, red cut; age, share lost)",
+            name="Links (amber stale, violet distrusted, red cut; age, share lost)",
             visual_bounds=rrb.VisualBounds2D(x_range=(-1.9, 1.9), y_range=(-1.9, 1.9)),
         )
 
@@ -117,6 +119,8 @@ class Links:
     def _state(self, link: LinkState | None) -> int:
         if link is not None and link.cut:
             return _CUT
+        if link is not None and link.trust < _LITTLE_TRUST:
+            return _DOUBTED
         return _FRESH if link is not None and link.age <= self._subject.stale_after else _STALE
 
     def _style(self, states: NDArray[np.int_]) -> tuple[NDArray[np.uint8], rr.components.RadiusBatch]:
@@ -206,6 +210,8 @@ def _note(link: LinkState | None, state: int, loss: float) -> str:
         return f"{10 * round(10.0 * loss)} %" if loss > 0.05 else "1 %"
     if link is None or math.isinf(link.age):
         return "cut, none received" if link is not None and link.cut else "none received"
+    if state == _DOUBTED:
+        return f"trust {math.floor(10.0 * link.trust) / 10.0:g}"
     return ("cut, " if link.cut else "") + f"{math.floor(link.age)} s"
 
 

@@ -31,6 +31,8 @@ class _Links:
         self._times = np.unique(links["t"])
         self._places = np.searchsorted(self._times, links["t"])
         self._columns = {name: links[name] for name in ("uav", "sender", "received", "lost", "oldest")}
+        # Runs of earlier versions have none.
+        self._columns["trust"] = links.get("trust", np.ones(len(links["t"])))
 
     def at(self, t: float) -> dict[int, dict[int, LinkState]]:
         """Return the last state of each link up to ``t``, by receiver and sender."""
@@ -39,23 +41,23 @@ class _Links:
             return {}
         states: dict[int, dict[int, LinkState]] = {}
         before = self._rows(place - 1)
-        for edge, (received, lost, oldest) in self._rows(place).items():
-            received_before, lost_before, _ = before.get(edge, (0, 0, 0.0))
+        for edge, (received, lost, oldest, trust) in self._rows(place).items():
+            received_before, lost_before, _, _ = before.get(edge, (0, 0, 0.0, 1.0))
             received_since, lost_since = received - received_before, lost - lost_before
             age = math.inf if math.isnan(oldest) else oldest
             states.setdefault(edge[0], {})[edge[1]] = LinkState(
-                age, received, lost, received_since == 0 and lost_since > 0
+                age, received, lost, received_since == 0 and lost_since > 0, trust
             )
         return states
 
-    def _rows(self, place: int) -> dict[tuple[int, int], tuple[int, int, float]]:
+    def _rows(self, place: int) -> dict[tuple[int, int], tuple[int, int, float, float]]:
         if place < 0:
             return {}
         rows = np.flatnonzero(self._places == place)
         c = self._columns
         return {
             (int(c["uav"][n]), int(c["sender"][n])): (
-                int(c["received"][n]), int(c["lost"][n]), float(c["oldest"][n])
+                int(c["received"][n]), int(c["lost"][n]), float(c["oldest"][n]), float(c["trust"][n])
             )
             for n in rows
         }  # fmt: skip

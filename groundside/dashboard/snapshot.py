@@ -34,6 +34,8 @@ class LinkState:
     lost: int
     cut: bool
     """Whether the link is cut or a radio is off."""
+    trust: float = 1.0
+    """Share of its weight that the receiver's defences leave the sender."""
 
 
 @dataclass(frozen=True)

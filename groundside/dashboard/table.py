@@ -11,6 +11,7 @@ from rerun.blueprint.encodings import TimelineColumn
 from ftcc.groundside.dashboard.detail import Detail
 from ftcc.groundside.dashboard.labels import (
     describe_beliefs,
+    describe_distrust,
     describe_faults,
     describe_silence,
     faulty_actuators,
@@ -106,7 +107,8 @@ def _describe_links(state: UavState) -> str:
         return ""
     received, lost = sum(link.received for link in links), sum(link.lost for link in links)
     share = f", {100.0 * lost / (received + lost):.0f} % lost" if lost else ""
-    return f"{sum(not link.cut for link in links)} of {len(links)}{share}"
+    doubted = describe_distrust(state)
+    return f"{sum(not link.cut for link in links)} of {len(links)}{share}{f', {doubted}' if doubted else ''}"
 
 
 def log_view() -> rrb.TextLogView:

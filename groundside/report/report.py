@@ -29,6 +29,7 @@ from ftcc.groundside.report.page import (
 from ftcc.groundside.report.plates import Plates, look_of
 from ftcc.groundside.report.readings import compare
 from ftcc.groundside.report.shown import figure_of_claims, links_of_claims
+from ftcc.groundside.report.trust import trust_sections
 from ftcc.groundside.results import NothingRecordedError, Run, sole_writer
 from ftcc.groundside.verdict import is_diagnosed
 
@@ -112,6 +113,7 @@ def _write(run: Run, folder: Path, look: Look) -> Path:
     page.sections.append(links_section(run.links, mission, plates))
     if run.network:
         page.sections.append(network_section(run.network))
+    page.sections += trust_sections(run.links, mission, plates)
     page.sections += _late_section(run)
     page.sections += _versions_section(run)
     return write(page, folder / "index.html")

@@ -48,7 +48,7 @@ class Flight(Recording):
     signals: NDArray[np.float64]
     """(n, k, s): in the order of the scheme's ``SIGNALS``."""
     links: NDArray[np.float64]
-    """(m, k, e, 5): a row per report and in-edge, in the order of the neighbours; see ``link.channel.LINK_REPORT``."""
+    """(m, k, e, 6): a row per report and in-edge, by neighbour: ``link.channel.LINK_REPORT``, then trust."""
     t: NDArray[np.float64]
     """(n,): s."""
     lost: dict[int, tuple[float, str]]
@@ -132,13 +132,13 @@ class Flight(Recording):
         ]
         values = [self.links[:, i, edge] for i, edge, _, _ in edges]
         rows = np.stack(values, axis=1) if values else np.empty(0)
-        rows = rows.reshape(len(times) * len(edges), len(LINK_REPORT))
+        rows = rows.reshape(len(times) * len(edges), len(LINK_REPORT) + 1)
         table: dict[str, NDArray[Any]] = {
             "t": np.repeat(times, len(edges)),
             "uav": np.tile(np.array([edge[2] for edge in edges], np.int32), len(times)),
             "sender": np.tile(np.array([edge[3] for edge in edges], np.int32), len(times)),
         }
-        table |= {name: rows[:, n] for n, name in enumerate(LINK_REPORT)}
+        table |= {name: rows[:, n] for n, name in enumerate((*LINK_REPORT, "trust"))}
         reported = np.isfinite(table["sent"])
         return {name: column[reported] for name, column in table.items()}
 

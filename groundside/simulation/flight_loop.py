@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.autopilots import build as build_autopilots
+from ftcc.airside.defence.arrays import Edge
 from ftcc.airside.flight_path import Own
 from ftcc.airside.link_events import LinkEvents, link_events, set_links
 from ftcc.airside.spec import AutopilotSpec
@@ -57,6 +58,9 @@ _state_of = cycle.sense
 _advance = cycle.advance
 _conditions = cycle.conditions
 
+_TRUST = len(LINK_REPORT)
+"""Where the trust in the sender stands behind the report on a link."""
+_STANDING = Edge._fields.index("standing")
 _OWN_COMMAND = Own._fields.index("aileron")
 """Index of the first actuator command in `Own`."""
 _V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
@@ -91,7 +95,7 @@ class Recording(NamedTuple):
     signals: NDArray[np.float64]
     """(n, k, s)."""
     links: NDArray[np.float64]
-    """(m, k, e, 5): by in-edge, see ``link.channel.LINK_REPORT``; nan where there is none."""
+    """(m, k, e, 6): by in-edge, see ``link.channel.LINK_REPORT``, then trust; nan where there is none."""
     lost: NDArray[np.int64]
     """(k,): cause of a loss, see ``sim.plant.LOST``; 0 = not lost."""
     lost_us: NDArray[np.int64]
@@ -123,7 +127,7 @@ def new_recording(rows: int, reports: int, kept: Kept, edges: tuple[int, int]) -
         acting=acting,
         conditions=conditions,
         signals=signals,
-        links=np.full((reports, *edges, len(LINK_REPORT)), np.nan),
+        links=np.full((reports, *edges, len(LINK_REPORT) + 1), np.nan),
         lost=np.zeros(k, np.int64),
         lost_us=np.zeros(k, np.int64),
         first=np.zeros(2, np.int64),
@@ -360,7 +364,9 @@ def _record(world, timing, n):
         if n % report_every == 0 and recording.lost[i] == 0:
             for edge in range(world.inbox.degree[i]):
                 report = n // report_every - recording.first[1]
-                report_link(world.inbox, i, edge, recording.links[report, i, edge])
+                row = recording.links[report, i, edge]
+                report_link(world.inbox, i, edge, row)
+                row[_TRUST] = world.autopilots.defence.edges[i, edge, _STANDING]
 
 
 @compiled_within

@@ -39,6 +39,7 @@ class _UavTelemetry:
     truth: tuple[float, ...] = ()
     signals: tuple[float, ...] = ()
     links: tuple[float, ...] = ()
+    trust: tuple[float, ...] = ()
     mode: str = ""
 
 
@@ -129,6 +130,8 @@ class Monitor:
                 uav.signals = message.values
             elif message.name == "links":
                 uav.links = message.values
+            elif message.name == "trust":
+                uav.trust = message.values
         elif message.kind == HEARTBEAT:
             custom = int(message.values[0])
             mode = mode_of(custom >> 16 & 0xFF, custom >> 24)
@@ -185,7 +188,7 @@ def _state_reader(
         return UavState(
             t=latest.t,
             signals=dict(zip(signals, latest.signals, strict=False)),
-            links=_links(latest.links),
+            links=_links(latest.links, latest.trust),
             mode=latest.mode,
             late=int(truth[late]),
             **by_name,
@@ -201,11 +204,14 @@ def _picker(places: list[int]) -> Callable[[Sequence[float]], tuple[float, ...]]
     return lambda values: tuple(values[place] for place in places)
 
 
-def _links(data: Sequence[float]) -> dict[int, LinkState]:
+def _links(data: Sequence[float], trusts: Sequence[float]) -> dict[int, LinkState]:
+    trusted = dict(zip(map(int, trusts[::2]), trusts[1::2], strict=False))
     size = len(LINK_FIELDS)
     found = {}
     for start in range(0, len(data) - size + 1, size):
         if data[start] > 0:
             sender, age, received, lost, cut = data[start : start + size]
-            found[int(sender)] = LinkState(age if age >= 0 else math.inf, int(received), int(lost), bool(cut))
+            heard_for = age if age >= 0 else math.inf
+            trust = trusted.get(int(sender), 1.0)
+            found[int(sender)] = LinkState(heard_for, int(received), int(lost), bool(cut), trust)
     return found

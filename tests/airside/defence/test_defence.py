@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ftcc.airside.compiled_stages import placeholder
-from ftcc.airside.defence.arrays import columns_of, new_defence
+from ftcc.airside.defence.arrays import GIVEN, TRUST, columns_of, new_defence
 from ftcc.airside.defence.credibility import credit_left, is_lie, surprise
 from ftcc.airside.defence.events import trust_text
 from ftcc.airside.defence.gains import defence_gains
@@ -48,7 +48,7 @@ class Swarm:
         d = self.defence
         d.shared_at[0] = t
         defend(d, 0, self.n, values, age, valid, stamp, own, self.events, t, DT)
-        return d.trust[0, : self.n].copy(), d.values[0, : self.n].copy()
+        return d.heard[TRUST, 0, : self.n].copy(), d.heard[GIVEN, 0, : self.n].copy()
 
     def told_events(self):
         senders = [neighbour.uav for neighbour in self.spec.neighbours]
@@ -234,7 +234,7 @@ def test_before_it_has_an_own_value_nothing_is_compared():
     d = swarm.defence
     values, stamp = np.array([[9.0, 0, 0, 0], [8, 0, 0, 0]]), np.zeros(2, np.int64)
     defend(d, 0, 2, values, np.zeros(2), np.ones(2), stamp, np.zeros(4), swarm.events, 0.0, DT)
-    assert (d.trust[0] == 1.0).all()
+    assert (d.heard[TRUST] == 1.0).all()
 
 
 def test_columns_say_which_values_have_rates():
