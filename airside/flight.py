@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.attacks.lies import is_quiet, must_be_recorded
 from ftcc.airside.defence.arrays import Edge as Standing
 from ftcc.airside.flight_path import Own
 from ftcc.airside.group import EVENTS, LOST, PUBLISH, SECOND, TELEMETRY, WRITE
@@ -67,8 +68,8 @@ def _sense(autopilots, i, state, reported, now_us):
 
 
 @compiled_apart
-def _hear(exchange, inbox, events, timing, i, now_us):
-    stages.hear(exchange, inbox, events, timing, i, now_us)
+def _hear(attacks, exchange, inbox, events, timing, i, now_us):
+    stages.hear(attacks, exchange, inbox, events, timing, i, now_us)
 
 
 @compiled_apart
@@ -130,7 +131,7 @@ def sense(group, i, now_us):
 @compiled_within
 def hear(group, timing, i, now_us):
     """Take the records that are due through the channel into the inbox."""
-    _hear(group.exchange, group.inbox, group.link_events, timing, i, now_us)
+    _hear(group.attacks, group.exchange, group.inbox, group.link_events, timing, i, now_us)
 
 
 if stages.ACTIVE:
@@ -199,10 +200,11 @@ def actuate(group, i, now_us):
 def publish(group, timing, i, now_us):
     """Post a record to the out-neighbours in this process, and put it into the next transmission for the others."""
     sequence = now_us // timing.exchange_us
-    _publish(group.autopilots, group.exchange, group.link_events, i, sequence, now_us)
+    _publish(group.autopilots, group.attacks, group.exchange, group.link_events, i, sequence, now_us)
     if group.heard_outside[i] == 1:
         uav, radio_on = group.wire.system[i], group.link_events.radio_on[i]
-        if not append(group.transmission, uav, sequence, now_us, radio_on, group.autopilots.shared[i]):
+        values = group.autopilots.shared[i] if is_quiet(group.attacks) else group.attacks.told[i]
+        if not append(group.transmission, uav, sequence, now_us, radio_on, values):
             group.unsendable[0] = 1
 
 
@@ -232,7 +234,7 @@ def something_to_do(group, timing, now_us):
     to_do = 0
     if group.transmission.used[0] > 0:
         to_do |= PUBLISH
-    if is_full(group.rows) or is_full(group.link_rows):
+    if is_full(group.rows) or is_full(group.link_rows) or must_be_recorded(group.attacks):
         to_do |= WRITE
     if now_us // timing.period_us % ticks_a_second(timing.period_us) == 0:
         to_do |= SECOND

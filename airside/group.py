@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.attacks.arrays import Attacks, new_attacks
 from ftcc.airside.autopilots import Autopilots, build
 from ftcc.airside.link_events import LinkEvents, link_events
 from ftcc.airside.spec import AutopilotSpec
@@ -32,6 +33,7 @@ class AutopilotGroup(NamedTuple):
     """k autopilots of one scheme that fly in one process."""
 
     autopilots: Autopilots
+    attacks: Attacks
     inbox: Inbox
     link_events: LinkEvents
     exchange: Exchange
@@ -109,6 +111,7 @@ def build_group(specs: Sequence[AutopilotSpec], timing: Timing, rows: Rows, link
     values = autopilots.shared.shape[1]
     return AutopilotGroup(
         autopilots=autopilots,
+        attacks=new_attacks(specs, values, timing),
         inbox=inbox,
         link_events=link_events(specs),
         exchange=new_exchange(own, senders, inbox.valid.shape[1], values),

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from types import ModuleType
 
+from ftcc.airside.attacks.recording import LieRecorder
 from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.compiled_stages import flight_of, stages_of
 from ftcc.airside.gcs import AutopilotView, GcsLink
@@ -94,6 +95,13 @@ class AutopilotProcess:
             on_trouble=self.report_trouble,
         )
         self.group = build_group(specs, self.timing, self.recorder.rows, self.link_recorder.rows)
+        self.lie_recorder = LieRecorder(
+            setting.folder,
+            [spec.uav for spec in specs],
+            find(specs[0].scheme),
+            self.group.attacks,
+            self.report_trouble,
+        )
         load_compiled(self.group, self.timing, self.flight)
         ports = [setting.ports[spec.uav] for spec in specs]
         self.vehicles = [
@@ -174,9 +182,11 @@ class AutopilotProcess:
         if to_do & WRITE:
             self.recorder.write()
             self.link_recorder.write()
+            self.lie_recorder.write_if_due()
         if to_do & SECOND:
             self.recorder.write_if_due()
             self.link_recorder.write_if_due()
+            self.lie_recorder.write_if_due()
         if to_do & EVENTS:
             for at_us, uav, severity, text in drain_leader_events(self.group.autopilots, self.specs):
                 self.gate.report(EventReport(severity, text, uav, at_us))
@@ -248,6 +258,7 @@ class AutopilotProcess:
             for recorder in (self.recorder, self.link_recorder):
                 if recorder.rows.filled.any():
                     recorder.write()
+            self.lie_recorder.write()
 
     def warn_if_stalled(self) -> None:
         """Log what this process waits for, where it has waited for long."""
@@ -300,6 +311,7 @@ class AutopilotProcess:
             link.end()
         self.recorder.close()
         self.link_recorder.close()
+        self.lie_recorder.close()
         for spec, link in zip(self.specs, self.gcs_links, strict=True):
             dropped = {reason: count for reason, count in link.dropped().items() if count}
             if dropped:

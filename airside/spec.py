@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ftcc.airside.attacks.attack import Attack
 from ftcc.airside.model import Model
 from ftcc.airside.references.profiles import Profile
 from ftcc.airside.scheme import Flight
@@ -116,6 +117,10 @@ class AutopilotSpec:
     """The same with fault tolerance on, where ``gains`` has it off."""
     diagnosis: DiagnosisSpec = DiagnosisSpec()
     defence: DefenceSpec = DefenceSpec()
+    attacks: tuple[Attack, ...] = ()
+    """Lies of this UAV, and on its in-edges."""
+    authenticated: bool = False
+    """Whether nobody can speak in the name of another UAV: records are signed."""
     flight: Flight | None = None
     """What the scheme's conditions on gains are checked against, also in flight; None: no check."""
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ftcc.airside.attacks.lies import deliver_with_lies, is_quiet, tell
 from ftcc.airside.defence.arrays import GIVEN, ON, TRUST
 from ftcc.airside.defence.stage import defend
 from ftcc.airside.flight_path import Own, decode_state
@@ -147,9 +148,12 @@ def sense(autopilots, i, state, reported, now_us):
 
 
 @compiled
-def hear(exchange, inbox, events, timing, i, now_us):
+def hear(attacks, exchange, inbox, events, timing, i, now_us):
     """Take the records that are due for UAV ``i`` through the channels of its in-edges."""
-    deliver_due(exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
+    if is_quiet(attacks):
+        deliver_due(exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
+    else:
+        deliver_with_lies(attacks, exchange, inbox, events.radio_on[i], i, now_us, timing.latency_us, timing.seed)
     hear_inbox(inbox, i, now_us)
 
 
@@ -245,7 +249,11 @@ def control(autopilots, inbox, i, dt):
 
 
 @compiled
-def publish(autopilots, exchange, events, i, sequence, now_us):
+def publish(autopilots, attacks, exchange, events, i, sequence, now_us):
     """Post what UAV ``i`` shares of this instant to those of this process, or simulation, that hear it."""
     _share_health(autopilots, i)
-    post(exchange, i, sequence, now_us, events.radio_on[i], autopilots.shared[i])
+    values = autopilots.shared[i]
+    if not is_quiet(attacks):
+        tell(attacks, exchange, values, i, sequence, now_us)
+        values = attacks.told[i]
+    post(exchange, i, sequence, now_us, events.radio_on[i], values)

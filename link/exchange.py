@@ -26,6 +26,7 @@ __all__ = [
     "append",
     "begin",
     "deliver_due",
+    "due_sequence",
     "new_exchange",
     "new_transmission",
     "newest_slot",
@@ -33,6 +34,7 @@ __all__ = [
     "post",
     "problem_text",
     "senders_in",
+    "slot_of",
     "take_in",
 ]
 
@@ -113,6 +115,24 @@ def newest_slot(exchange, row):
 
 
 @compiled
+def slot_of(sequence):
+    """Where the record of this sequence number stands, if it is kept."""
+    return sequence % _HISTORY
+
+
+@compiled
+def due_sequence(exchange, inbox, i, edge, now_us, latency_us):
+    """Sequence number of the next record on in-edge ``edge`` of UAV ``i`` (indices) if it is due; -1: none is."""
+    row = exchange.sender[i, edge]
+    count = exchange.next_sequence[row]
+    for sequence in range(max(inbox.edges[i, edge, _NEXT], count - _HISTORY), count):
+        slot = slot_of(sequence)
+        if exchange.sequence[row, slot] == sequence:
+            return sequence if exchange.stamp[row, slot] + latency_us <= now_us else -1
+    return -1
+
+
+@compiled
 def deliver_due(exchange, inbox, radio_on, i, now_us, latency_us, seed):
     """Deliver the records that are due for UAV ``i`` (index) at ``now_us`` through the channels of its in-edges.
 
@@ -120,18 +140,14 @@ def deliver_due(exchange, inbox, radio_on, i, now_us, latency_us, seed):
     """
     for edge in range(inbox.degree[i]):
         row = exchange.sender[i, edge]
-        count = exchange.next_sequence[row]
-        sequence = max(inbox.edges[i, edge, _NEXT], count - _HISTORY)
-        while sequence < count:
-            slot = sequence % _HISTORY
-            if exchange.sequence[row, slot] == sequence:
-                stamp = exchange.stamp[row, slot]
-                if stamp + latency_us > now_us:
-                    break
-                both_on = exchange.radio_on[row, slot] == 1 and radio_on == 1
-                values = exchange.values[row, slot]
-                deliver(inbox, i, edge, sequence, stamp, both_on, values, latency_us, now_us, seed)
-            sequence += 1
+        while True:
+            sequence = due_sequence(exchange, inbox, i, edge, now_us, latency_us)
+            if sequence < 0:
+                break
+            slot = slot_of(sequence)
+            both_on = exchange.radio_on[row, slot] == 1 and radio_on == 1
+            values, stamp = exchange.values[row, slot], exchange.stamp[row, slot]
+            deliver(inbox, i, edge, sequence, stamp, both_on, values, latency_us, now_us, seed)
 
 
 class Header(NamedTuple):

@@ -10,13 +10,14 @@ import math
 
 from ftcc.link.compiled import compiled
 
-__all__ = ["CHANNEL", "DOOR", "GUST", "NOISE", "TURBULENCE", "gaussian_pair", "philox", "uniform"]
+__all__ = ["ATTACK", "CHANNEL", "DOOR", "GUST", "NOISE", "TURBULENCE", "gaussian_pair", "philox", "uniform"]
 
 CHANNEL = 1
 NOISE = 2
 GUST = 3
 TURBULENCE = 4
 DOOR = 5
+ATTACK = 6
 
 _MASK = 0xFFFFFFFF
 

@@ -51,7 +51,7 @@ NETWORK_FILE = "network.jsonl"
 AIRCRAFT_LOST = "aircraft lost: "
 """How the text of an event begins that reports why a UAV was lost."""
 
-_INTEGERS = ("uav", "sender")
+_INTEGERS = ("uav", "sender", "receiver")
 
 
 class Column(NamedTuple):
@@ -77,7 +77,7 @@ LINK_COLUMNS = (
 
 
 def part_path(folder: Path, uav: int, role: str) -> Path:
-    """The file for a UAV's ``role``: "vehicle", "autopilot" or "links"."""
+    """The file for a UAV's ``role``: "vehicle", "autopilot", "links" or "lies"."""
     return Path(folder) / "parts" / f"{uav}-{role}.arrows"
 
 

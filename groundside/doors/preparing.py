@@ -51,6 +51,7 @@ def set_aside(mission: Mission) -> tuple[str, ...]:
         "the autothrottle (the autopilot has the throttle)": any(
             spec.autothrottle != NO_AUTOTHROTTLE for spec in mission.vehicles
         ),
+        "attacks (the other autopilot shares no records)": any(spec.attacks for spec in mission.autopilots),
         "faults of navigation": any(spec.navigation_faults for spec in mission.vehicles),
         "the measurement noise (doors have sensors)": any(any(spec.noise) for spec in mission.vehicles),
     }

@@ -6,6 +6,8 @@ from .folders import lock_until_exit as lock_until_exit
 from .folders import new_folder as new_folder
 from .folders import reserved_folder as reserved_folder
 from .folders import sole_writer as sole_writer
+from .lies import LIES_FILE as LIES_FILE
+from .lies import in_order as in_order
 from .recording import MissingPackageError as MissingPackageError
 from .recording import Recording as Recording
 from .recording import require as require

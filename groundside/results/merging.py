@@ -122,7 +122,7 @@ def merge_parts(folder: Path, target: Path, as_of: int) -> bool:
 
     parts = []
     for path in sorted(folder.glob("*.arrows")):
-        if not path.stem.endswith("-links"):
+        if not path.stem.endswith(("-links", "-lies")):
             try:
                 parts.append(_Part(path))
             except (pa.ArrowInvalid, OSError, EOFError):

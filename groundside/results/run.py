@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ftcc.groundside.results.column_reader import ColumnReader
 from ftcc.groundside.results.folders import RunError
+from ftcc.groundside.results.lies import read_lies
 from ftcc.groundside.results.merging import merge_run, up_to_date_table
 from ftcc.groundside.results.recording import Recording
 from ftcc.link.recording import (
@@ -175,6 +176,15 @@ class Run(Recording):
         """
         path = self.path / NETWORK_FILE
         return read_lines(path) if path.is_file() else []
+
+    @functools.cached_property
+    def lies(self) -> dict[str, NDArray[Any]]:
+        """What UAVs that lied told their neighbours, and what was true: a row per false record, by time.
+
+        Columns: t (s), uav (whose record it is), receiver (who alone heard the lie; 0: everybody), then ``true_X`` and
+        ``told_X`` of every quantity X that UAVs share; nan: this one shares none. Empty where nobody lied.
+        """
+        return read_lies(self.path, self.mission.lie_columns)
 
     @functools.cached_property
     def links(self) -> dict[str, NDArray[Any]]:

@@ -16,7 +16,11 @@ from ftcc.sim.wind import AIR
 
 __all__ = ["HEALTHY", "healthy_changes", "healthy_quantities"]
 
-HEALTHY: dict[str, Any] = {"faults": [], "diagnosis": {"on": True, "accommodate": False, "cooperate": False}}
+HEALTHY: dict[str, Any] = {
+    "faults": [],
+    "attacks": [],
+    "diagnosis": {"on": True, "accommodate": False, "cooperate": False},
+}
 """What makes any scenario one of healthy aircraft that diagnose themselves, merged like a variant."""
 
 _LOSS = 0.3

@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import tomli_w
 
+from ftcc.airside.attacks.attack import Attack
+from ftcc.airside.attacks.recording import lie_columns
 from ftcc.airside.autopilots import recorded_signals
 from ftcc.airside.diagnosis.beliefs import belief_signals
 from ftcc.airside.model import Model
@@ -24,6 +26,7 @@ from ftcc.airside.scheme import FAULT_TOLERANCE, Flight, Quantity, Scheme
 from ftcc.airside.spec import AutopilotSpec, DefenceSpec, DiagnosisSpec, LinkEvent, Neighbour, OwnReference
 from ftcc.groundside.claims import check_claims
 from ftcc.groundside.scenario.as_flown import as_flown
+from ftcc.groundside.scenario.attacks import attacks_of
 from ftcc.groundside.scenario.checks import (
     IDEAL,
     Findings,
@@ -54,6 +57,7 @@ from ftcc.groundside.schema import AirframeSheet, Claim, Plan, PointMassSheet
 from ftcc.link.actuators import THRUST
 from ftcc.link.channel import Channel
 from ftcc.link.graph import Graph
+from ftcc.link.recording import Column
 from ftcc.link.timing import Timing
 from ftcc.sim.disturbances import CALM
 from ftcc.sim.jsbsim.aircraft import Aircraft
@@ -98,6 +102,11 @@ class Mission:
     def signals(self) -> tuple[Quantity, ...]:
         """What each follower's autopilot records."""
         return recorded_signals(self.autopilots[0])
+
+    @property
+    def lie_columns(self) -> tuple[Column, ...]:
+        """What is recorded of UAVs that lie to their neighbours: what was true, and what was told."""
+        return lie_columns(self.scheme)
 
     @property
     def uavs(self) -> tuple[int, ...]:
@@ -156,6 +165,7 @@ def resolve(scenario: Scenario) -> Mission:
     tolerant = _tolerant_gains(scenario, basis.scheme, gains, findings)
     channel = Channel(**plan.channel.model_dump())
     changes = link_changes(plan.link_events, basis.graph, health_edges(plan, basis.graph), channel, findings.refuse)
+    attacks = attacks_of(plan, basis.scheme, basis.graph, basis.timing, findings)
     diagnosis = diagnosis_of(plan, basis.scheme, basis.plant, vehicles[0], _is_steered(basis), findings)
     defence = defence_of(plan, basis.scheme, basis.graph, findings)
     check_delays(plan, basis.timing, findings)
@@ -176,6 +186,7 @@ def resolve(scenario: Scenario) -> Mission:
         changes,
         diagnosis,
         defence,
+        attacks,
     )
     return Mission(
         name=scenario.name,
@@ -336,6 +347,7 @@ def _autopilots(
     changes: Mapping[int, Sequence[LinkEvent]],
     diagnosis: DiagnosisSpec,
     defence: DefenceSpec,
+    attacks: Mapping[int, tuple[Attack, ...]],
 ) -> tuple[AutopilotSpec, ...]:
     """Return the spec of each vehicle's autopilot."""
     graph, scheme = basis.graph, basis.scheme
@@ -362,6 +374,8 @@ def _autopilots(
             ),
             channel=channel,
             link_events=tuple(changes.get(vehicle.uav, ())),
+            attacks=attacks.get(vehicle.uav, ()),
+            authenticated=plan.network.authenticated,
             profile=profiles.get(vehicle.uav),
             offset=vehicle.offset,
             datum=vehicle.datum,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
+from ftcc.groundside.scenario.attacks import attack_texts
 from ftcc.groundside.scenario.faults import fault_texts
 from ftcc.groundside.scenario.links import link_texts
 from ftcc.groundside.scenario.references import reference_texts
@@ -23,6 +24,7 @@ def planned_events(plan: Plan, plant: ModuleType) -> tuple[PlannedEvent, ...]:
         *fault_texts(plan),
         *_disturbance_texts(plan, plant),
         *link_texts(plan.link_events),
+        *attack_texts(plan),
         *wind_texts(plan),
     ]
     events = [(t, uav, "info", text) for t, uav, text in commands]

@@ -4,6 +4,7 @@
 """
 
 from ftcc.groundside.schema.aircraft import AirframeSheet, Damping, Lag, PointMassSheet, RateLimits, Start, record_of
+from ftcc.groundside.schema.attacks import AttackFields
 from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.network import ChannelFields, LinkEventFields
 from ftcc.groundside.schema.plan import Claim, Plan, Rates, fields_of
@@ -14,6 +15,7 @@ from ftcc.groundside.schema.world import FaultFields
 
 __all__ = [
     "AirframeSheet",
+    "AttackFields",
     "ChannelFields",
     "Claim",
     "Damping",

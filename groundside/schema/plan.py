@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 from ftcc.groundside.schema.aircraft import Plant, Starts
+from ftcc.groundside.schema.attacks import AttackFields, NetworkFields
 from ftcc.groundside.schema.base import Id, Strict
 from ftcc.groundside.schema.defence import DefenceFields
 from ftcc.groundside.schema.diagnosis import DiagnosisFields
@@ -132,6 +133,8 @@ class Plan(Strict):
     disturbances: list[DisturbanceFields] = []
     faults: list[FaultFields] = []
     link_events: list[LinkEventFields] = []
+    attacks: list[AttackFields] = []
+    network: NetworkFields = NetworkFields()
     noise: NoiseFields = NoiseFields()
     home: HomeFields = HomeFields()
     claims: list[Claim] = []

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftcc.groundside.results import Recording, arrow_table
+from ftcc.groundside.results import Recording, arrow_table, in_order
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.columns import NotRecordedError, places_kept, places_of
 from ftcc.groundside.verdict import Verdict, judge
@@ -55,6 +55,8 @@ class Flight(Recording):
     """Time (s) and cause of each loss, by UAV."""
     events: tuple[tuple[float, int, str, str], ...] = ()
     """All other events: time s, UAV, severity, text."""
+    lies: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """(l, c): what was true and what was told of those who lie, see `Mission.lie_columns`."""
     first_report: int = 0
     """Number of the first report in ``links``."""
     columns: frozenset[str] | None = None
@@ -141,6 +143,10 @@ class Flight(Recording):
         table |= {name: rows[:, n] for n, name in enumerate((*LINK_REPORT, "trust"))}
         reported = np.isfinite(table["sent"])
         return {name: column[reported] for name, column in table.items()}
+
+    def lie_table(self) -> dict[str, NDArray[Any]]:
+        """Return what was true and what was told, a row per false record, by time, UAV and receiver."""
+        return in_order(self.mission.lie_columns, self.lies)
 
     def table(self) -> dict[str, NDArray[Any]]:
         """Return all recorded columns: a row per recorded tick and UAV, by time, then UAV."""

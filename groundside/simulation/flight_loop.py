@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.attacks.arrays import Attacks, new_attacks
+from ftcc.airside.attacks.lies import hear_through_lies, is_quiet, tell
 from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.autopilots import build as build_autopilots
 from ftcc.airside.defence.arrays import Edge
@@ -21,7 +23,7 @@ from ftcc.airside.spec import AutopilotSpec
 from ftcc.link.actuators import ACTUATORS, as_sent, decode_command, encode_command
 from ftcc.link.attitude_target import decode_target, encode_target
 from ftcc.link.channel import LINK_REPORT, Inbox, report_link
-from ftcc.link.compiled import compiled, compiled_within, copy, fill
+from ftcc.link.compiled import compiled, compiled_apart, compiled_within, copy, fill
 from ftcc.link.exchange import Exchange, new_exchange, newest_slot
 from ftcc.link.messages import AttitudeTarget, StateMessage
 from ftcc.link.timing import Timing, ticks_a_second
@@ -44,7 +46,6 @@ cycle: Any = globals()["cycle"]
 
 _control = stages.control
 _diagnose = stages.diagnose
-_hear = stages.hear
 _predict_shared = stages.predict_shared
 _publish = stages.publish
 _refer = stages.refer
@@ -64,6 +65,12 @@ _STANDING = Edge._fields.index("standing")
 _OWN_COMMAND = Own._fields.index("aileron")
 """Index of the first actuator command in `Own`."""
 _V, _GAMMA, _CHI = (Own._fields.index(name) for name in ("V", "gamma", "chi"))
+
+
+@compiled_apart
+def _hear(attacks, exchange, inbox, events, timing, i, now_us):
+    stages.hear(attacks, exchange, inbox, events, timing, i, now_us)
+
 
 _SETTLED = 1e-6
 """The exchange at one time is repeated until no shared value changes by more than this, in its unit."""
@@ -139,6 +146,7 @@ class World(NamedTuple):
 
     fleet: Fleet
     autopilots: Autopilots
+    attacks: Attacks
     inbox: Inbox
     events: LinkEvents
     exchange: Exchange
@@ -182,6 +190,7 @@ def new_world(
     return World(
         fleet=build_fleet(vehicles),
         autopilots=autopilots,
+        attacks=new_attacks(specs, values, timing),
         inbox=inbox,
         events=link_events(specs),
         exchange=new_exchange(uavs, senders, inbox.valid.shape[1], values),
@@ -224,14 +233,14 @@ def _tick_by_wire(world, timing, n):
             _sense(autopilots, i, world.state, world.controls, now)
     for i in range(lost.shape[0]):
         if lost[i] == 0:
-            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _hear(world.attacks, world.exchange, inbox, world.events, timing, i, now)
             _diagnose(autopilots, i, now, timing.period_us / 1e6)
             _refer(autopilots, inbox, i, now, timing.period_us)
             _control_follower(world, timing, i, now)
     if now % timing.exchange_us == 0:
         for i in range(lost.shape[0]):
             if lost[i] == 0:
-                _publish(autopilots, world.exchange, world.events, i, now // timing.exchange_us, now)
+                _publish(autopilots, world.attacks, world.exchange, world.events, i, now // timing.exchange_us, now)
 
 
 @compiled_within
@@ -251,22 +260,22 @@ def _ideal_tick(world, timing, n):
         copy(fleet.command[i], own[_OWN_COMMAND:])
         if autopilots.leader[i] == 1:
             # Leaders use each other's records of the previous tick; records of this tick are published later.
-            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _hear(world.attacks, world.exchange, inbox, world.events, timing, i, now)
         _diagnose(autopilots, i, now, timing.period_us / 1e6)
         _refer(autopilots, inbox, i, now, timing.period_us)
     for i in range(lost.shape[0]):
         if lost[i] == 0:
             if autopilots.leader[i] == 0:
                 _set_shared(autopilots, inbox, i)
-            _publish(autopilots, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
+            _publish(autopilots, world.attacks, world.exchange, world.events, i, world.exchange.next_sequence[i], now)
     if _SWEEPS > 1:
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
-                _hear(world.exchange, inbox, world.events, timing, i, now)
+                _hear(world.attacks, world.exchange, inbox, world.events, timing, i, now)
         _settle_exchange(world, now, timing.period_us / 1e6)
     for i in range(lost.shape[0]):
         if lost[i] == 0 and autopilots.leader[i] == 0:
-            _hear(world.exchange, inbox, world.events, timing, i, now)
+            _hear(world.attacks, world.exchange, inbox, world.events, timing, i, now)
             _control_follower(world, timing, i, now)
     for i in range(lost.shape[0]):
         if _flies(world.recording, i, now):
@@ -319,21 +328,34 @@ def _settle_exchange(world, now, dt):
 
     For a law whose shared values depend on its neighbours' values of the same time: an algebraic loop around the graph.
     """
-    exchange, autopilots, inbox, lost = world.exchange, world.autopilots, world.inbox, world.recording.lost
+    attacks, exchange, autopilots, inbox, lost = (
+        world.attacks,
+        world.exchange,
+        world.autopilots,
+        world.inbox,
+        world.recording.lost,
+    )
     for _ in range(_SWEEPS - 1):
         moved = 0.0
         for i in range(lost.shape[0]):
             if lost[i] == 0 and autopilots.leader[i] == 0:
                 _predict_shared(autopilots, inbox, i, dt)
-                last = exchange.values[i, newest_slot(exchange, i)]
+                told, last = autopilots.shared[i], exchange.values[i, newest_slot(exchange, i)]
+                if not is_quiet(attacks):
+                    tell(attacks, exchange, told, i, exchange.next_sequence[i] - 1, now)
+                    told = attacks.told[i]
                 for m in range(last.shape[0]):
-                    moved = max(moved, abs(autopilots.shared[i, m] - last[m]))
-                copy(autopilots.shared[i], last)
+                    moved = max(moved, abs(told[m] - last[m]))
+                copy(told, last)
         for i in range(lost.shape[0]):
             for edge in range(inbox.degree[i]):
                 if inbox.stamp[i, edge] == now:
                     row = exchange.sender[i, edge]
-                    copy(exchange.values[row, newest_slot(exchange, row)], inbox.values[i, edge])
+                    if is_quiet(attacks):
+                        copy(exchange.values[row, newest_slot(exchange, row)], inbox.values[i, edge])
+                    else:
+                        sequence = exchange.next_sequence[row] - 1
+                        hear_through_lies(attacks, exchange, i, edge, sequence, inbox.values[i, edge])
         if moved <= _SETTLED:
             break
 

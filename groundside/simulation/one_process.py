@@ -18,6 +18,8 @@ import numpy as np
 import psutil  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from ftcc.airside.attacks.arrays import LOG_FULL
+from ftcc.airside.attacks.recording import drain_lies
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.law_errors import describe_error, describe_not_finite
 from ftcc.airside.leader import drain_leader_events
@@ -112,17 +114,19 @@ def fly_in_parts(
     if ready is not None:
         ready()
     end = timing.ticks + 1
-    chunk = min(room, max(1, -(-end // _CHUNKS)))
+    chunk = min(room, max(1, -(-end // _CHUNKS)), _until_lies_are_full(mission))
     flown = taken = 0
     interrupted = False
     events: list[tuple[float, int, str, str]] = []
+    told = [np.empty((0, len(mission.lie_columns)))]
     diverged: set[int] = set()
     while flown < end and not interrupted:
         try:
             if flown == taken + room:
                 with defer_interrupt():
-                    take(flight_so_far(taken, flown, events))
+                    take(flight_so_far(taken, flown, events, told))
                     taken = flown
+                    told = told[:1]
                     world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
             # A law that has just been written fails at the first tick, if ever: then that is all there is to say of it.
             until = min(end, flown + chunk, taken + room) if flown else 1
@@ -131,6 +135,7 @@ def fly_in_parts(
                 warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
             events += _drain_all_events(mission, world.fleet, world.autopilots)
             events += _describe_divergence(mission, world, diverged)
+            told.append(drain_lies(world.attacks, mission.scheme))
             flown = until
             if progress is not None:
                 progress((flown - 1) * timing.period)
@@ -141,7 +146,13 @@ def fly_in_parts(
         except KeyboardInterrupt:
             # The flight so far is recorded, and its verdict says that it ended early.
             interrupted = True
-    return flight_so_far(taken, flown, events)
+    return flight_so_far(taken, flown, events, told)
+
+
+def _until_lies_are_full(mission: Mission) -> int:
+    """Return for how many ticks what attacked UAVs tell can wait to be recorded."""
+    attacks = sum(len(spec.attacks) for spec in mission.autopilots)
+    return max(1, LOG_FULL // max(1, attacks)) * mission.timing.exchange_every
 
 
 @contextlib.contextmanager
@@ -171,6 +182,7 @@ def _flight_so_far(
     begin: int,
     end: int,
     events: list[tuple[float, int, str, str]],
+    told: list[NDArray[np.float64]],
 ) -> Flight:
     """Return the recording of ticks ``begin`` .. ``end`` - 1, with all events so far."""
     timing = mission.timing
@@ -192,6 +204,7 @@ def _flight_so_far(
             if recording.lost[i] > 0
         },
         events=tuple(events),
+        lies=np.concatenate(told),
         first_report=report,
         columns=None if columns is None else frozenset(columns),
     )

@@ -11,7 +11,7 @@ import psutil  # type: ignore[import-untyped]
 
 from ftcc.airside.compiled_stages import stages_of
 from ftcc.airside.spec import is_active
-from ftcc.groundside.results import Run, TableWriter
+from ftcc.groundside.results import LIES_FILE, Run, TableWriter
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.flight import Flight, recorded_columns
 from ftcc.groundside.simulation.one_process import LawError, Progress, defer_interrupt, fly_in_parts
@@ -50,12 +50,18 @@ def fly_to_disk(
         _nothing_left_of_an_error(folder),
         TableWriter(folder / "signals.parquet", recorded_columns(mission)) as signals,
         TableWriter(folder / "links.parquet", LINK_COLUMNS) as links,
+        contextlib.ExitStack() as more,
     ):
+        lies: TableWriter | None = None
 
         def take(part: Flight) -> None:
-            nonlocal last
+            nonlocal last, lies
             signals.write(part.table())
             links.write(part.link_table())
+            if len(part.lies):
+                # A file only where anybody lied.
+                lies = lies or more.enter_context(TableWriter(folder / LIES_FILE, mission.lie_columns))
+                lies.write(part.lie_table())
             last = float(part.t[-1]) if len(part.t) else last
 
         room = min(timing.ticks + 1, max(1, _BLOCK // len(mission.uavs)) * timing.record_every)
@@ -71,7 +77,7 @@ def _nothing_left_of_an_error(folder: Path) -> Iterator[None]:
     try:
         yield
     except LawError:
-        for name in ("signals.parquet", "links.parquet"):
+        for name in ("signals.parquet", "links.parquet", LIES_FILE):
             (folder / name).unlink(missing_ok=True)
         raise
 
