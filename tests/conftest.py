@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SLOW_FOLDERS = ("sitl", "clients", "browser")
+SLOW_FOLDERS = ("sitl", "hosts", "clients", "browser")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -17,6 +17,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,9 +26,14 @@ from .wire import Weather, to_json
 
 __all__ = ["Host", "Network", "why_not"]
 
-_FIRST = ["sh", "-c", "ip link set lo up && trap '' CHLD && echo ready && read end; exit 0"]
-"""The first process of a namespace waits for the end of its input. The trap makes the kernel bury the processes that
-others leave behind."""
+_FIRST = """
+import signal, sys
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+"""The first process of a namespace waits for the end of its input. It ignores its children, so that the kernel buries
+the processes that others leave behind."""
 _NEW = ["unshare", "--net", "--pid", "--fork", "--kill-child", "--mount", "--mount-proc"]
 _AS_ROOT = ["--user", "--map-root-user"]
 """A user's namespace, in which somebody who is not root may lay wires."""
@@ -39,7 +45,7 @@ class _Space:
     """Namespaces of network, processes and mounts, which live as long as their first process."""
 
     def __init__(self, inside: Sequence[str] = (), user: bool = False) -> None:
-        command = [*inside, *_NEW, *(_AS_ROOT if user else []), *_FIRST]
+        command = [*inside, *_NEW, *(_AS_ROOT if user else []), sys.executable, "-S", "-c", _FIRST]
         self._holder = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -51,8 +57,6 @@ class _Space:
         # Of the chain of processes that only wait for the next one, the last is the first of the namespace.
         self.first = self._holder.pid
         while below := _children(self.first):
-            if len(below) > 1 or Path(f"/proc/{self.first}/comm").read_text().strip() == "sh":
-                break
             self.first = below[0]
         self.network = ["nsenter", f"--target={self.first}", "--net"]
         if user or "--user" in inside:
@@ -87,6 +91,7 @@ class Host:
         self._switch, self._space = switch, space
         self._port = f"to-{name}"
         self._wire: subprocess.Popen[str] | None = None
+        space.call("ip link set lo up")
         switch.call(f"ip link add {self._port} type veth peer name eth0 netns {space.first}")
         switch.call(f"ip link set {self._port} master switch up")
         space.call(f"ip address add {address}/24 dev eth0")
@@ -115,14 +120,17 @@ class Host:
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit() and int(entry.name) != self._space.first:
                 with contextlib.suppress(OSError):  # it has just ended
-                    if os.stat(entry / "ns/pid").st_ino == space and _parent(entry) != self._space.first:
+                    if os.stat(entry / "ns/pid").st_ino == space:
                         found.append(int(entry.name))
         return found
 
     def kill_all(self) -> None:
-        """SIGKILL to every process of this host at once; its network stays, so that the kernel still closes sockets."""
-        everyone = "import os, signal; os.kill(-1, signal.SIGKILL)"  # in this namespace, but its first and the caller
-        subprocess.run([*self._space.enter, sys.executable, "-S", "-c", everyone], check=True)
+        """SIGKILL to every process of this host; its network stays, so that the kernel still closes sockets."""
+        while everyone := self.processes():
+            for process in everyone:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            time.sleep(0.001)
 
     def lose_power(self) -> None:
         """Cut the link, then end every process: nobody hears a last word."""
@@ -140,7 +148,8 @@ class Host:
     def weather(self, weather: Weather) -> None:
         """From now on, frames from and to this host travel as ``weather`` says."""
         self.lay_wire()
-        assert self._wire is not None and self._wire.stdin is not None
+        assert self._wire is not None
+        assert self._wire.stdin is not None
         self._wire.stdin.write(to_json(weather))
         self._await_wire()
 
@@ -158,7 +167,8 @@ class Host:
         self._await_wire()
 
     def _await_wire(self) -> None:
-        assert self._wire is not None and self._wire.stdout is not None
+        assert self._wire is not None
+        assert self._wire.stdout is not None
         assert self._wire.stdout.readline() == "ready\n", f"the wire of host {self.name} has ended"
 
     def _close(self) -> None:
@@ -215,7 +225,3 @@ def _children(process: int) -> list[int]:
     with contextlib.suppress(OSError):
         return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     return []
-
-
-def _parent(entry: Path) -> int:
-    return int((entry / "stat").read_text().rpartition(")")[2].split()[1])

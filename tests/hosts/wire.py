@@ -6,6 +6,7 @@ kernel's ``netem`` does, which many kernels are built without, and draws from a 
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import itertools
 import json
@@ -23,6 +24,7 @@ _SOL_PACKET, _VNET_HDR, _IGNORE_OUTGOING = 263, 15, 23
 """Of <linux/if_packet.h>. With the header, a frame keeps the state of its checksum, which the sender left to be filled
 in by hardware that is not there."""
 _FRAME = 1 << 17
+_RECEIVE_BUFFER_FORCE, _BUFFER = 33, 1 << 24
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,9 @@ def _open(name: str) -> socket.socket:
     opened = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(_EVERY_PROTOCOL))
     opened.setsockopt(_SOL_PACKET, _VNET_HDR, 1)
     opened.setsockopt(_SOL_PACKET, _IGNORE_OUTGOING, 1)
+    # Frames of a flight come in bursts; the system's largest buffer may be too small for them.
+    with contextlib.suppress(PermissionError):
+        opened.setsockopt(socket.SOL_SOCKET, _RECEIVE_BUFFER_FORCE, _BUFFER)
     opened.bind((name, 0))
     return opened
 
