@@ -99,7 +99,9 @@ def _program(addresses: Iterable[ipaddress.IPv4Address | ipaddress.IPv6Address])
     program: list[Instruction] = []
     for address in addresses:
         words = struct.unpack(f"!{len(address.packed) // 4}I", address.packed)
-        checks = [((_BYTE, 0, 0, _NETWORK), (_SHIFT, 0, 0, 4), address.version)]
+        checks: list[tuple[Instruction, Instruction | None, int]] = [
+            ((_BYTE, 0, 0, _NETWORK), (_SHIFT, 0, 0, 4), address.version)
+        ]
         source = _NETWORK + _SOURCE[address.version]
         checks += [((_WORD, 0, 0, source + 4 * n), None, word) for n, word in enumerate(words)]
         block: list[Instruction] = [(_RETURN, 0, 0, _WHOLE)]
