@@ -99,15 +99,13 @@ def _program(addresses: Iterable[ipaddress.IPv4Address | ipaddress.IPv6Address])
     program: list[Instruction] = []
     for address in addresses:
         words = struct.unpack(f"!{len(address.packed) // 4}I", address.packed)
-        checks: list[tuple[Instruction, Instruction | None, int]] = [
-            ((_BYTE, 0, 0, _NETWORK), (_SHIFT, 0, 0, 4), address.version)
-        ]
         source = _NETWORK + _SOURCE[address.version]
-        checks += [((_WORD, 0, 0, source + 4 * n), None, word) for n, word in enumerate(words)]
+        version: tuple[list[Instruction], int] = ([(_BYTE, 0, 0, _NETWORK), (_SHIFT, 0, 0, 4)], address.version)
+        checks = [version, *(([(_WORD, 0, 0, source + 4 * n)], word) for n, word in enumerate(words))]
         block: list[Instruction] = [(_RETURN, 0, 0, _WHOLE)]
-        for load, shift, wanted in reversed(checks):
+        for load, wanted in reversed(checks):
             # What differs jumps behind the return of this address.
-            block = [load, *((shift,) if shift else ()), (_IF_EQUAL, 0, len(block), wanted), *block]
+            block = [*load, (_IF_EQUAL, 0, len(block), wanted), *block]
         program += block
     return [*program, (_RETURN, 0, 0, 0)]
 

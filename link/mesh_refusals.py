@@ -15,6 +15,7 @@ import os
 import re
 import sys
 import threading
+import weakref
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -133,7 +134,19 @@ class RefusalCounter:
         os.dup2(end, 1)
         os.close(end)
         self._stdout = sys.stdout
-        sys.stdout = io.TextIOWrapper(os.fdopen(os.dup(self._log), "wb", 0), line_buffering=True, write_through=True)
+        self._own: io.TextIOWrapper | None = None
+        if _writes_to(sys.stdout, 1):
+            self._own = io.TextIOWrapper(
+                os.fdopen(os.dup(self._log), "wb", 0),
+                encoding=sys.stdout.encoding,
+                errors=sys.stdout.errors,
+                line_buffering=True,
+                write_through=True,
+            )
+            sys.stdout = self._own
+        # A child has a log of its own at that descriptor, or gives itself one.
+        forget = weakref.WeakMethod(self._give_back)
+        os.register_at_fork(after_in_child=lambda: (back := forget()) and back())
         _start_log(f"{_LOG},{_ACCESS}=trace" if messages else _LOG)
 
     def watch(self, session: Any) -> None:
@@ -142,13 +155,16 @@ class RefusalCounter:
 
     def poll(self) -> list[Refusal]:
         """What was refused since the last call, the most frequent first; does not wait."""
-        self._drain()
+        self.drain()
         with self._lock:
             fresh, self._fresh = self._fresh, collections.Counter()
         return [Refusal(*what, count) for what, count in fresh.most_common()]
 
-    def _drain(self) -> None:
-        """Read what the pipe holds, and no more: a flood must not keep us here."""
+    def drain(self) -> None:
+        """Read and count what the pipe holds, and no more: a flood must not keep us here.
+
+        To be called more often than `poll` where many messages are counted: the pipe holds about 4000 of them.
+        """
         with contextlib.suppress(BlockingIOError):
             *lines, rest = (self._rest + os.read(self._pipe, _PIPE)).split(b"\n")
             self._rest = rest[-_LONGEST:]
@@ -159,14 +175,18 @@ class RefusalCounter:
         """Put standard output back; what had not been polled."""
         if self._listener is not None:
             self._listener.undeclare()
-        sys.stdout.flush()
-        sys.stdout.close()
-        sys.stdout = self._stdout
+        self._give_back()
         os.dup2(self._log, 1)
         left = self.poll()
         os.close(self._log)
         os.close(self._pipe)
         return left
+
+    def _give_back(self) -> None:
+        """Give Python its own standard output back."""
+        if self._own is not None and sys.stdout is self._own:
+            self._own.flush()
+            sys.stdout = self._stdout
 
     def _linked(self, event: Any) -> None:
         """In Zenoh's thread: a link has come or gone."""
@@ -229,6 +249,14 @@ class RefusalCounter:
             who = subject[1].decode(errors="replace") if subject else self._of_zid.get(zid, zid)
             what, key = denied["what"].decode(errors="replace"), denied["key"].decode(errors="replace")
             self._count(f"may not {_DEEDS.get(what, what.lower())} {key[:_SHOWN]}", who)
+
+
+def _writes_to(stream: Any, descriptor: int) -> bool:
+    """Whether a stream of Python writes to a descriptor; one of a notebook or a test does not."""
+    try:
+        return bool(stream.fileno() == descriptor)
+    except (AttributeError, OSError, ValueError):
+        return False
 
 
 def _meaning(text: bytes) -> str:

@@ -145,19 +145,23 @@ def uav_access(swarm: str, own: int, hears: Iterable[int], heard_by: Iterable[in
     }
 
 
-def node_access(swarm: str, own: str, nodes: Iterable[str] = ()) -> dict[str, Rights]:
-    """What passes between the node ``own``, the lead, and the ``nodes`` with which it has links of its own.
+def node_access(swarm: str, own: str) -> dict[str, Rights]:
+    """What passes between the node ``own`` and the lead; nodes have no links to each other.
 
-    A node publishes below ``ftcc/SWARM/node/NAME``, the lead below ``ftcc/SWARM/lead``; all may read both.
+    A node publishes below ``ftcc/SWARM/node/NAME``. The lead publishes for it below ``ftcc/SWARM/lead/to/NAME``, and
+    for all as ``ftcc/SWARM/lead/*``.
     """
-    return {LEAD: _between(_branch(swarm, own), _branch(swarm))} | {
-        node_name(other): _between(_branch(swarm, own), _branch(swarm, other)) for other in nodes if other != own
-    }
+    lead, node = _branches(swarm, own)
+    return {LEAD: Rights(hears=lead, tells=node, asks=lead, answers=(f"ftcc/{swarm}/node/**",))}
 
 
 def lead_access(swarm: str, nodes: Iterable[str]) -> dict[str, Rights]:
-    """What passes between the lead and the nodes."""
-    return {node_name(node): _between(_branch(swarm), _branch(swarm, node)) for node in nodes}
+    """What passes between the lead and the nodes, see `node_access`."""
+    return {
+        node_name(own): Rights(hears=node, tells=lead, asks=(f"ftcc/{swarm}/node/**",), answers=lead)
+        for own in nodes
+        for lead, node in (_branches(swarm, own),)
+    }
 
 
 def security(credentials: Credentials, others: Mapping[str, Rights]) -> dict[str, Any]:
@@ -168,12 +172,6 @@ def security(credentials: Credentials, others: Mapping[str, Rights]) -> dict[str
     }
 
 
-def _branch(swarm: str, node: str = "") -> tuple[str, str]:
-    """The keys below which a node, or the lead, publishes, and those by which others may ask for them."""
-    if node:
-        return f"ftcc/{swarm}/node/{node}/**", f"ftcc/{swarm}/node/**"
-    return f"ftcc/{swarm}/lead/**", f"ftcc/{swarm}/lead/**"
-
-
-def _between(own: tuple[str, str], other: tuple[str, str]) -> Rights:
-    return Rights(hears=(other[0],), tells=(own[0],), asks=(other[1],), answers=(own[1],))
+def _branches(swarm: str, node: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The keys of what the lead publishes for a node, and of what the node publishes."""
+    return (f"ftcc/{swarm}/lead/*", f"ftcc/{swarm}/lead/to/{node}/**"), (f"ftcc/{swarm}/node/{node}/**",)

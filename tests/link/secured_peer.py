@@ -81,7 +81,7 @@ class Peer:
         zenoh = import_zenoh()
         credentials = Credentials(Path(keys), name)
         swarm, lead = credentials.swarm, name == "lead"
-        others = lead_access(swarm, nodes) if lead else node_access(swarm, name.removeprefix("node-"), nodes)
+        others = lead_access(swarm, nodes) if lead else node_access(swarm, name.removeprefix("node-"))
         self.refusals = RefusalCounter(others)
         here = "tls/127.0.0.1:{}".format
         secured = security(credentials, others)
@@ -95,10 +95,11 @@ class Peer:
         def hear(sample: Any) -> None:
             self.heard.append(f"{sample.key_expr} {bytes(sample.payload).decode()}")
 
-        asked = f"ftcc/{swarm}/node/**" if lead else f"ftcc/{swarm}/lead/**"
+        asked = f"ftcc/{swarm}/node/**" if lead else f"ftcc/{swarm}/lead/{'**' if lawless else '*'}"
         own = f"ftcc/{swarm}/lead" if lead else f"ftcc/{swarm}/node/{name.removeprefix('node-')}"
         self.kept = [
             self.session.declare_subscriber(asked, hear),
+            self.session.declare_subscriber(f"ftcc/{swarm}/lead/to/{name.removeprefix('node-')}/*", hear),
             self.session.liveliness().declare_subscriber(
                 asked, lambda sample: self.heard.append(f"{sample.key_expr} {sample.kind}"), history=True
             ),
@@ -173,7 +174,7 @@ class Peer:
             ).encode()
             while text:
                 text = text[os.write(1, text) :]
-                self.refusals._drain()
+                self.refusals.drain()
         for one in self.refusals.poll():
             kinds, total = kinds + 1, total + one.times
         return [kinds, total, _MOST]
@@ -181,6 +182,16 @@ class Peer:
     def say(self, text: str) -> None:
         """Print, which must not be lost among Zenoh's lines."""
         print(text, flush=True)
+
+    def say_in_child(self, text: str, log: str) -> None:
+        """Print in a forked child that has a log of its own, as the processes of a swarm do."""
+        child = os.fork()
+        if child == 0:
+            with open(log, "w") as file:
+                os.dup2(file.fileno(), 1)
+            print(text, flush=True)
+            os._exit(0)
+        os.waitpid(child, 0)
 
     def close(self) -> list[list[Any]]:
         self.mesh.close()
