@@ -25,9 +25,10 @@ from ftcc.link.exchange import (
     take_in,
 )
 from ftcc.link.gate import EventReport, Gate, NetworkReport
-from ftcc.link.mesh import Mesh
+from ftcc.link.mesh import Mesh, port_of
+from ftcc.link.mesh_door import Door
 from ftcc.link.mesh_keys import uav_name
-from ftcc.link.mesh_refusals import RefusalCounter
+from ftcc.link.mesh_refusals import RefusalCounter, RefusalTexts
 from ftcc.link.mesh_security import Credentials, security, uav_access
 from ftcc.link.process import Setting
 
@@ -41,8 +42,6 @@ _STALLED = 5.0
 """Wall time without progress after which transmissions are sent again, s."""
 _NETWORK_PERIOD = 1.0
 """Wall time between two reports on the network, s."""
-_REFUSALS_PERIOD = 5.0
-"""Wall time between two reports on who was refused, s: what comes in between is counted."""
 _MOST_RECORDS = 256
 """In a transmission."""
 
@@ -66,7 +65,7 @@ class Neighbourhood:
         self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
         self._mesh: Mesh | None = None
         self._refusals: RefusalCounter | None = None
-        self._refusals_told = time.monotonic()
+        self._texts: RefusalTexts | None = None
         if linked:
             group.on_mesh[0] = 1
             # A peer listens on the port of its process's first UAV; of two peers the later one connects.
@@ -96,6 +95,10 @@ class Neighbourhood:
             )
             if self._refusals is not None:
                 self._refusals.watch(self._mesh.session)
+                self._texts = RefusalTexts(self._refusals)
+                if setting.known_addresses and listen:
+                    callers = {setting.peers[peer].address for peer in linked if peer in setting.peers}
+                    self._texts.door = Door(port_of(listen), callers)
         self._own = specs[0].uav
         self._traffic = self._mesh.traffic if self._mesh else {}
         self._reported = time.monotonic()
@@ -197,11 +200,8 @@ class Neighbourhood:
 
     def report_refusals(self, last: bool = False) -> None:
         """Report now and then, and at the end, who was refused by the mesh."""
-        now = time.monotonic()
-        if self._refusals is not None and (last or now - self._refusals_told >= _REFUSALS_PERIOD):
-            self._refusals_told = now
-            for refusal in self._refusals.poll():
-                self._gate.report(EventReport("warning", refusal.text))
+        for text in self._texts.due(last) if self._texts else ():
+            self._gate.report(EventReport("warning", text))
 
     def _warn_once(self, text: str) -> None:
         self._bad += 1
@@ -225,5 +225,7 @@ class Neighbourhood:
         """Leave the mesh."""
         if self._mesh:
             self._mesh.close()
+        if self._texts is not None and self._texts.door is not None:
+            self._texts.door.close()
         if self._refusals is not None:
             self._refusals.close()

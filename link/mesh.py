@@ -21,7 +21,7 @@ import numpy as np
 from ftcc.link.linger import close_at_once, linger_again
 from ftcc.link.traffic import Traffic
 
-__all__ = ["Mesh", "configuration", "import_zenoh"]
+__all__ = ["Mesh", "configuration", "import_zenoh", "port_of"]
 
 _RING = 16
 """Transmissions kept of each sender in real time."""
@@ -209,6 +209,11 @@ def configuration(
         },
     }
     return zenoh.Config.from_json5(json.dumps(merged(settings, security)))
+
+
+def port_of(endpoint: str) -> int:
+    """The port of an endpoint such as "tls/10.0.0.1:7447"."""
+    return int(endpoint.rpartition(":")[2])
 
 
 def merged(settings: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:

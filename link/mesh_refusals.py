@@ -15,14 +15,16 @@ import os
 import re
 import sys
 import threading
+import time
 import weakref
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ftcc.link.mesh import import_zenoh
+from ftcc.link.mesh_door import Door
 
-__all__ = ["Refusal", "RefusalCounter"]
+__all__ = ["Refusal", "RefusalCounter", "RefusalTexts"]
 
 _PIPE = 1 << 20
 """Bytes that the pipe holds; what does not fit between two polls is lost, not waited for."""
@@ -38,6 +40,9 @@ _SHOWN = 100
 """Characters of a key, or of a reason that is not known here, that are told."""
 _CACHED = 9
 """Decisions that Zenoh takes in advance, and logs like refusals, when it first meets a key."""
+
+_PERIOD, _LONGEST_PERIOD = 2.5, 320.0
+"""Wall time between two reports, at first and in a flood, s."""
 
 _LOG = "error,zenoh_link_tls=warn,zenoh::net::runtime::orchestrator=debug"
 _ACCESS = "zenoh::net::routing::interceptor::access_control"
@@ -257,6 +262,37 @@ def _writes_to(stream: Any, descriptor: int) -> bool:
         return bool(stream.fileno() == descriptor)
     except (AttributeError, OSError, ValueError):
         return False
+
+
+class RefusalTexts:
+    """What there is to tell of refusals, less and less often in a flood: what comes in between is counted.
+
+    Parameters
+    ----------
+    counter : whose refusals.
+    """
+
+    def __init__(self, counter: RefusalCounter) -> None:
+        self._counter = counter
+        self._period, self._due = _PERIOD, 0.0
+        self._dropped = 0
+        self.door: Door | None = None
+        """Whose dropped packets are told, too."""
+
+    def due(self, last: bool = False) -> list[str]:
+        """What is to be told now, mostly nothing; to be called often. ``last``: tell all that is left."""
+        self._counter.drain()
+        now = time.monotonic()
+        if now < self._due and not last:
+            return []
+        texts = [refusal.text for refusal in self._counter.poll()]
+        if self.door is not None and self.door.dropped > self._dropped:
+            texts.append(f"mesh: {self.door.dropped - self._dropped} packets from unknown addresses dropped")
+            self._dropped = self.door.dropped
+        if texts:
+            self._period = min(2.0 * self._period, _LONGEST_PERIOD)
+        self._due = now + self._period
+        return texts
 
 
 def _meaning(text: bytes) -> str:

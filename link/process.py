@@ -73,6 +73,8 @@ class Setting:
     """Wall time after which a mesh link over which nothing comes counts as broken, s."""
     tls: Path | None = None
     """Folder of keys: with it the mesh is encrypted, and speaks only to those who belong to it."""
+    known_addresses: bool = False
+    """Whether the mesh ignores callers from addresses that are none of the swarm's computers."""
 
     def system(self, uav: int) -> int:
         """MAVLink system id of a UAV towards the ground."""

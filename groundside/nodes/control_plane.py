@@ -9,15 +9,16 @@ from __future__ import annotations
 import collections
 import contextlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ftcc.groundside.nodes.messages import MessageError, decode, encode
 from ftcc.link.linger import close_at_once, linger_again
 from ftcc.link.mesh import configuration, import_zenoh
+from ftcc.link.mesh_door import Door
 from ftcc.link.mesh_keys import LEAD
-from ftcc.link.mesh_refusals import RefusalCounter
+from ftcc.link.mesh_refusals import RefusalCounter, RefusalTexts
 from ftcc.link.mesh_security import Credentials, Rights, security
 
 __all__ = ["PLANE", "Bell", "ControlPlane", "for_node", "from_node"]
@@ -86,6 +87,7 @@ class ControlPlane:
         others: Mapping[str, Rights],
     ) -> None:
         self._refusals: RefusalCounter | None = None
+        self._texts: RefusalTexts | None = None
         settings: Mapping[str, Any] = {}
         if tls is not None:
             settings = security(Credentials(tls, own), others)
@@ -95,6 +97,7 @@ class ControlPlane:
         self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, settings))
         if self._refusals is not None:
             self._refusals.watch(self._session)
+            self._texts = RefusalTexts(self._refusals)
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
         self._declared: list[Any] = [close_at_once(self._session)]
@@ -114,8 +117,13 @@ class ControlPlane:
         return came
 
     def refusals(self) -> list[str]:
-        """Return who was refused since the last call, as texts."""
-        return [] if self._refusals is None else [refusal.text for refusal in self._refusals.poll()]
+        """Return what there is to tell of who was refused; to be called often, mostly nothing."""
+        return [] if self._texts is None else self._texts.due()
+
+    def ignore_others(self, port: int, addresses: Iterable[str]) -> None:
+        """From here on ignore callers at this end's port from other addresses, where links are encrypted."""
+        if self._texts is not None:
+            self._texts.door = Door(port, addresses)
 
     def keep(self, sender: str, what: Any) -> None:
         """Keep something for `take`; from any thread."""
@@ -202,6 +210,8 @@ class ControlPlane:
             declared.undeclare()
         linger_again()
         self._session.close()
+        if self._texts is not None and self._texts.door is not None:
+            self._texts.door.close()
         if self._refusals is not None:
             self._refusals.close()
         self._bell.close()

@@ -33,6 +33,7 @@ from ftcc.groundside.text import ids
 from ftcc.link.addresses import is_loopback, resolve
 from ftcc.link.gate import EventReport
 from ftcc.link.mavlink import LOOPBACK
+from ftcc.link.mesh import port_of
 from ftcc.link.mesh_keys import LEAD
 from ftcc.link.mesh_security import lead_access
 from ftcc.link.ports import PortBlock
@@ -49,8 +50,6 @@ _ROUND_TRIPS = 6.0
 """The same in round trips of the slowest node."""
 _WALL_TIMEOUT = 3.0
 """On the wall clock a link of the mesh over which nothing comes is given up after so long, s."""
-_REFUSALS_PERIOD = 5.0
-"""Wall time between two reports on who was refused, s: what comes in between is counted."""
 _FAREWELL = 3.0
 """Longest wait for the nodes to leave, wall s."""
 _LOG = "node-{}.log"
@@ -139,7 +138,6 @@ class Nodes:
         self._signed = signed
         self._tls = tls
         self._started = False
-        self._refusals_told = 0.0
         self._nodes = {
             node.name: _Node(
                 node,
@@ -214,7 +212,8 @@ class Nodes:
                         raise NodesError(f"node {name}: {why}")
                     case False:
                         node.address, node.placed = "", None
-            self._say_refusals(report)
+            for text in self._control.refusals():
+                report(text)
             for node in self._nodes.values():
                 if node.ssh is not None and node.ssh.poll() is not None:
                     raise NodesError(
@@ -222,13 +221,8 @@ class Nodes:
                     )
         slowest = max(node.offset.uncertainty for node in self._nodes.values())
         self.start_delay = max(_LEAST_START, 2.0 * _ROUND_TRIPS * slowest)
-
-    def _say_refusals(self, report: Callable[[str], None]) -> None:
-        """Report now and then who was refused."""
-        if time.monotonic() - self._refusals_told >= _REFUSALS_PERIOD:
-            self._refusals_told = time.monotonic()
-            for text in self._control.refusals():
-                report(text)
+        if self.plan.known_addresses:
+            self._control.ignore_others(port_of(self.endpoint), [node.address for node in self._nodes.values()])
 
     def _check_clock(self, node: _Node) -> None:
         """Refuse the wall clock where the clock of a node is off."""
@@ -299,12 +293,15 @@ class Nodes:
                     peer_of=setting.peer_of,
                     peers=places,
                     link_timeout=self._mesh_timeout,
+                    known_addresses=self.plan.known_addresses,
                     listeners=setting.listeners,
                     id_offset=setting.id_offset,
                     epoch_us=setting.epoch_us,
                 ),
             )
-        return dataclasses.replace(setting, peers=places, link_timeout=self._mesh_timeout)
+        return dataclasses.replace(
+            setting, peers=places, link_timeout=self._mesh_timeout, known_addresses=self.plan.known_addresses
+        )
 
     @property
     def _mesh_timeout(self) -> float:
@@ -370,7 +367,7 @@ class Nodes:
                     came += self._give_up(node, f"node {name} at {node.address} is gone")
                 case FileError():
                     came.append((None, EventReport("error", f"node {name}: {what}")))
-        self._say_refusals(lambda text: came.append((None, EventReport("warning", text))))
+        came += [(None, EventReport("warning", text)) for text in self._control.refusals()]
         return came
 
     def _give_up(self, node: _Node, text: str) -> list[tuple[Child | None, Any]]:

@@ -115,6 +115,7 @@ class Start:
     peer_of: dict[int, int]
     peers: dict[int, MeshPlace]
     link_timeout: float
+    known_addresses: bool
     listeners: tuple[tuple[str, int], ...]
     id_offset: int
     epoch_us: int

@@ -277,6 +277,7 @@ class _Node:
             computer=self.options.name,
             peers=start.peers,
             link_timeout=start.link_timeout,
+            known_addresses=start.known_addresses,
             tls=self.options.tls,
         )
         return relay, setting

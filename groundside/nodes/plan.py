@@ -72,6 +72,11 @@ class NodesPlan(Strict):
     largest_offset: float = Field(
         0.01, gt=0.0, le=1.0, description="s, between the clocks of two computers, with --clock wall"
     )
+    known_addresses: bool = Field(
+        True,
+        description="with --tls: callers from addresses at which no node has joined are ignored; false where a "
+        "computer calls from other addresses than that at which it is reached",
+    )
     nodes: list[NodeFields] = Field(min_length=1)
 
     @model_validator(mode="after")

@@ -73,6 +73,7 @@ OURS = [
         peer_of={1: 1, 2: 1},
         peers={1: MeshPlace("a", "10.0.0.2", 20004)},
         link_timeout=30.0,
+        known_addresses=True,
         listeners=(("127.0.0.1", 14550),),
         id_offset=0,
         epoch_us=1,
