@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from types import ModuleType
 
@@ -79,6 +80,8 @@ class AutopilotProcess:
     """The autopilots of a process."""
 
     def __init__(self, specs: Sequence[AutopilotSpec], setting: Setting, gate: Gate) -> None:
+        # Who has no certificate of a UAV cannot speak in its name.
+        specs = [replace(spec, authenticated=spec.authenticated or setting.tls is not None) for spec in specs]
         self.specs = specs
         self.setting = setting
         self.timing = setting.timing
@@ -137,6 +140,7 @@ class AutopilotProcess:
             autopilots=self.group.autopilots,
             inbox=self.group.inbox,
             link_events=self.group.link_events,
+            attacks=self.group.attacks,
             state=self.group.states[i],
             controls=self.group.controls[i],
             vehicle=self.vehicles[i],

@@ -64,13 +64,21 @@ LONGEST = 16384
 _ANY = 1e6
 
 ATTACK_SIZES = (
-    Size("ATK_KIND", 0.0, 0.0, float(len(KINDS)), "-", "kind of lie, see `ftcc attacks`; 0: the truth again"),
+    Size(
+        "ATK_KIND",
+        0.0,
+        0.0,
+        float(len(KINDS)),
+        "-",
+        "kind of lie, see `ftcc attacks`; 0: the truth again",
+        integer=True,
+    ),
     Size("ATK_SIZE", 0.0, -_ANY, _ANY, "unit of the signal", "size of the lie; collude: the target"),
     Size("ATK_RATE", 0.0, -_ANY, _ANY, "unit/s", "rate of a drift, or of the target of collude"),
     Size("ATK_PERIOD", 0.0, 0.0, 1e4, "s", "period of an oscillation, length of a window that is replayed; 0: none"),
     Size("ATK_DELAY", 0.0, 0.0, 1e4, "s", "how far back a replay looks"),
     Size("ATK_ONSET", 0.0, 0.0, 1e4, "s", "time in which collude comes to its target"),
-    Size("ATK_UNTIL", 0.0, 0.0, float(2**31 - 1), "ms", "simulated time at which it ends; 0: never"),
+    Size("ATK_UNTIL", 0.0, 0.0, float(2**31 - 1), "ms", "simulated time at which it ends; 0: never", integer=True),
     Size(
         "ATK_SIGNALS",
         0.0,
@@ -79,8 +87,8 @@ ATTACK_SIZES = (
         "-",
         "shared signals: 1 the first, 2, 4, ... added up; 0: no rates",
     ),
-    Size("ATK_CONSIST", 1.0, 0.0, 1.0, "-", "1: a told rate fits the told value; 0: it stays true"),
-    Size("ATK_AS", 0.0, 0.0, 200.0, "-", "sybil: the id of the UAV in whose name is spoken"),
+    Size("ATK_CONSIST", 1.0, 0.0, 1.0, "-", "1: a told rate fits the told value; 0: it stays true", integer=True),
+    Size("ATK_AS", 0.0, 0.0, 200.0, "-", "sybil: the id of the UAV in whose name is spoken", integer=True),
 )
 """Parameters of an autopilot that say what the next lie is; FTCC_AT says when it begins."""
 

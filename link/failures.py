@@ -57,6 +57,7 @@ class Size(NamedTuple):
     meaning: str
     scenario_name: str = ""
     """What scenarios and Python call it, where that is more than the name without FAIL_ in small letters."""
+    integer: bool = False
 
     @property
     def keyword(self) -> str:
@@ -225,6 +226,7 @@ _LINK: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "intermittent": ("records are lost", ("FAIL_LOSS", "FAIL_BURST_S", "FAIL_BURST_E", "FAIL_BURST_L")),
     "delayed": ("records come late", ("FAIL_DELAY",)),
     "slow": ("records come late by a random time", ("FAIL_JITTER",)),
+    "wrong": ("what is told is false: a lie as ATK_* say, see `ftcc attacks`", ()),
     "ok": ("restored", ()),
 }
 

@@ -194,15 +194,20 @@ def add_attack(attacks: Attacks, i: int, spec: AutopilotSpec, attack: Attack, sc
     return True
 
 
-def end_attacks(attacks: Attacks, i: int, edge: int, at_us: int, all_of_them: bool = True) -> int:
+def end_attacks(
+    attacks: Attacks, i: int, edge: int, at_us: int, all_of_them: bool = True, speaker: int | None = None
+) -> int:
     """End the attacks on in-edge ``edge`` (or `OWN`) of UAV ``i`` at ``at_us``; return how many.
 
-    Those that would begin later never begin; with ``all_of_them`` false they stay as they are.
+    Those that would begin later never begin; with ``all_of_them`` false they stay as they are. With ``speaker``, an
+    in-edge, only those that speak from there in another's name.
     """
     uav, place, begin, end = (Row._fields.index(name) for name in ("uav", "edge", "begin", "end"))
     rows = attacks.rows[: attacks.clock[0]]
     chosen = (rows[:, uav] == i) & (rows[:, place] == edge) & (rows[:, end] > at_us)
     if not all_of_them:
         chosen &= rows[:, begin] <= at_us
+    if speaker is not None:
+        chosen &= rows[:, Row._fields.index("speaker")] == speaker
     rows[chosen, end] = at_us
     return int(chosen.sum())

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ftcc.airside.attacks.arrays import Attacks
 from ftcc.airside.autopilots import Autopilots
 from ftcc.airside.defence.arrays import ON
 from ftcc.airside.link_events import LinkEvents
@@ -35,6 +36,7 @@ class AutopilotView:
     autopilots: Autopilots
     inbox: Inbox
     link_events: LinkEvents
+    attacks: Attacks
     state: NDArray[np.float64]
     """(13,): the vehicle's last state, as its messages bring it."""
     controls: NDArray[np.float64]
@@ -46,6 +48,8 @@ class AutopilotView:
     alive: bool = True
     failure_sizes: dict[str, float] = field(default_factory=dict)
     """Parameters FAIL_*: how large the next failure is."""
+    attack_sizes: dict[str, float] = field(default_factory=dict)
+    """Parameters ATK_*: what the next lie is."""
     at_ms: int = 0
     """Parameter FTCC_AT: simulated time at which failures and leaders' commands act, ms; 0 = now."""
     offboard_timeout: float = 1.0

@@ -7,8 +7,10 @@ import math
 import time
 from typing import Any, NamedTuple
 
+from ftcc.airside.attacks.attack import FOR_EVER
 from ftcc.airside.flight_path import Own
 from ftcc.airside.gcs.answers import ACCEPTED, BUSY, DENIED, UNSUPPORTED, Answer, Request
+from ftcc.airside.gcs.attacks import begin_lie
 from ftcc.airside.gcs.autopilot_view import AutopilotView
 from ftcc.airside.gcs.outbox import Outbox
 from ftcc.airside.link_events import OWN_RADIO
@@ -69,6 +71,8 @@ class Failures:
         if why:
             return Answer(DENIED, why)
         instance = int(number)
+        if meaning.kind == "wrong" and not meaning.unit.on_board:
+            return self._lie(request, instance, at_us)
         if not meaning.unit.on_board:
             return self._fail_link(request, meaning, instance, at_us)
         if self._view.leader:
@@ -152,6 +156,19 @@ class Failures:
             if not inject_link_event(self._view.link_events, at_us, self._view.i, edge, quality):
                 return Answer(BUSY, "too many link failures are waiting")
         self._arm(request, "info" if meaning.kind == "ok" else "warning", self._text(meaning, instance), at_us)
+        return Answer(ACCEPTED, detail=at_us // 1000)
+
+    def _lie(self, request: Request, instance: int, at_us: int) -> Answer:
+        """Begin or end what is told instead of the truth."""
+        lie = begin_lie(self._view, instance, at_us)
+        if isinstance(lie, Answer):
+            return lie
+        # What was to end later ends here, or is replaced.
+        self._armed = [entry for entry in self._armed if entry[0] <= at_us or entry[3] not in (lie.begins, lie.ends)]
+        heapq.heapify(self._armed)
+        self._arm(request, "warning" if lie.ends else "info", lie.begins, at_us)
+        if lie.until_us != FOR_EVER:
+            self._arm(request, "info", lie.ends, lie.until_us)
         return Answer(ACCEPTED, detail=at_us // 1000)
 
     def _quality(self, meaning: Meaning) -> Channel:

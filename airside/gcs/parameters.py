@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ from ftcc.airside.gcs.telemetry import Telemetry
 from ftcc.airside.ranges import Range
 from ftcc.airside.references.position import Fire, change_from_ground, newest
 from ftcc.airside.scheme import FAULT_TOLERANCE, Quantity, quantities
+from ftcc.link.attacks import ATTACK_SIZES
 from ftcc.link.channel import Channel
 from ftcc.link.failures import SIZES, Size
 from ftcc.link.mavlink import as_typed, dialect
@@ -69,11 +70,13 @@ class Parameters:
 
     def __init__(self, view: AutopilotView, telemetry: Telemetry) -> None:
         self._view = view
-        view.failure_sizes.update({size.name: size.default for size in SIZES if size.name not in view.failure_sizes})
+        for sizes, known in ((view.failure_sizes, SIZES), (view.attack_sizes, ATTACK_SIZES)):
+            sizes.update({size.name: size.default for size in known if size.name not in sizes})
         own = [
             *_system(view),
             *_set_up(),
-            *_sizes(view),
+            *_sizes(view.failure_sizes, SIZES),
+            *_sizes(view.attack_sizes, ATTACK_SIZES),
             *_channel(view),
             *_fire(view),
             *_rates(view, telemetry),
@@ -188,17 +191,17 @@ def _set_up() -> Iterator[Parameter]:
     return (fixed(name, *rest) for name, rest in _SET_UP.items())
 
 
-def _sizes(view: AutopilotView) -> Iterator[Parameter]:
-    sizes = view.failure_sizes
+def _sizes(sizes: dict[str, float], known: Iterable[Size]) -> Iterator[Parameter]:
+    """Sizes of failures, or of lies."""
 
     def one(size: Size) -> Parameter:
         def write(value: float) -> None:
             sizes[size.name] = value
 
         meaning = f"{size.meaning}, {size.unit}"
-        return Parameter(size.name, lambda: sizes[size.name], write, size.low, size.high, meaning=meaning)
+        return Parameter(size.name, lambda: sizes[size.name], write, size.low, size.high, size.integer, meaning)
 
-    return map(one, SIZES)
+    return map(one, known)
 
 
 def _channel(view: AutopilotView) -> Iterator[Parameter]:

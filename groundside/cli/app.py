@@ -12,6 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from ftcc.groundside.cli import (
     airframe,
+    attacks,
     calibrate,
     failures,
     fly,
@@ -65,6 +66,8 @@ _SECTIONS: dict[str, tuple[Callable[..., Any] | typer.Typer, ...]] = {
         ground.fault,
         ground.repair,
         failures.failures,
+        attacks.attack,
+        attacks.attacks,
         ground.commands,
         ground.link,
         ground.ftc,

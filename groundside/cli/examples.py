@@ -33,6 +33,8 @@ EXAMPLES = {
     "ftcc fault": "ftcc fault 1 elevator --effectiveness 0.7 --bias 0.2 --at 60",
     "ftcc repair": "ftcc repair 1 elevator",
     "ftcc failures": "ftcc failures containment --variant sixdof",
+    "ftcc attack": "ftcc attack 3 drift --rate 0.5 --size 20 --at 60",
+    "ftcc attacks": "ftcc attacks",
     "ftcc commands": "ftcc commands",
     "ftcc link": "ftcc link cut 2",
     "ftcc link cut": "ftcc link cut 2 4 --at 60",

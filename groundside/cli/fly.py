@@ -124,6 +124,9 @@ def fly(
         fly_by_px4(load_mission(scenario, form, variant, settings, seed, duration), build, out, factor)
         return
     plan = _plan_of(nodes, ssh, tls, insecure)
+    if tls is not None:
+        # Who has no certificate of a UAV cannot speak in its name.
+        settings = [*(settings or []), "network.authenticated=true"]
     mission = load_mission(scenario, form, variant, settings, seed, duration)
     if plan is not None:
         plan.require_in(spec.uav for spec in mission.vehicles)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Sequence
+from typing import Any
 
 from ftcc.groundside.swarm.control import SwarmError
 from ftcc.groundside.swarm.conversation import RefusedError
@@ -42,6 +43,13 @@ class Commanding(abc.ABC):
     def repair(self, uav: int, what: str | None = None, *, at: float | None = None) -> None:
         """Remove the fault of one actuator or of the navigation solution, or all faults."""
         self.station.repair(uav, what, at=at)
+
+    def attack(self, uav: int, kind: str, **fields: Any) -> float:
+        """Have a UAV lie to its neighbours as ``ftcc attack`` does, and return when it begins, simulated s.
+
+        ``fields`` are those of `Station.attack`: ``to``, ``victim``, ``signals``, ``size``, ``at`` and so on.
+        """
+        return self.station.attack(uav, kind, **fields)
 
     def cut(self, *, uav: int | None = None, edge: tuple[int, int] | None = None, at: float | None = None) -> None:
         """Switch off the radio of a UAV, or cut the links between the two of an edge."""

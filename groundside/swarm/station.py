@@ -9,11 +9,14 @@ It speaks MAVLink with the autopilots, like any ground station, and finds their 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+import tomllib
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Self
 
 from ftcc.groundside.swarm.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
+from ftcc.link.attacks import KINDS as KINDS_OF_LIES
 from ftcc.link.failures import KINDS, UNITS, parameter_of
 from ftcc.link.flight_modes import code_of, mode_called
 from ftcc.link.mavlink import AUTOPILOT, dialect
@@ -60,6 +63,23 @@ def sizes_of_fault(what: str, kind: str, given: Mapping[str, float]) -> dict[str
     if actuator and kind == "wrong":
         sizes = {"effectiveness_onset": onset or 0.0, "bias_onset": onset or 0.0} | sizes
     return sizes
+
+
+def check_attack(kind: str, given: Collection[str]) -> None:
+    """Refuse a kind of lie that there is not, and sizes that are missing or that it does not have.
+
+    Raises
+    ------
+    StationError
+    """
+    if kind != "none" and kind not in KINDS_OF_LIES:
+        raise StationError(f"attack {kind}: no such kind; there are {', '.join(KINDS_OF_LIES)}, and none")
+    needs, takes = ((), ()) if kind == "none" else (KINDS_OF_LIES[kind].needs, KINDS_OF_LIES[kind].takes)
+    if missing := [name for name in needs if name not in given]:
+        raise StationError(f"attack {kind}: needs {', '.join(missing)}")
+    if extra := [name for name in given if name not in (*needs, *takes)]:
+        listed = ", ".join((*needs, *takes)) or "none"
+        raise StationError(f"attack {kind}: takes no {', '.join(extra)}; its sizes: {listed}")
 
 
 @dataclass
@@ -238,6 +258,101 @@ class Station(Conversation):
         if failed and len(failed) == len(uavs):
             raise failed[0]
         return [str(error) for error in failed]
+
+    # Lies.
+
+    def attack(
+        self,
+        uav: int,
+        kind: str,
+        *,
+        to: int | None = None,
+        victim: int | None = None,
+        signals: Sequence[str] = (),
+        consistent: bool = True,
+        at: float | None = None,
+        until: float | None = None,
+        **sizes: float,
+    ) -> float:
+        """Have a UAV lie to its neighbours, in the place of an earlier lie, or tell the truth again.
+
+        Parameters
+        ----------
+        kind : a name of ``ftcc.link.attacks.KINDS``, or "none": the truth.
+        to : who alone hears the lie; None: everybody.
+        victim : sybil: in whose name the UAV speaks, to all who hear both.
+        signals : names of what is false; by default all shared values that are no rates.
+        consistent : False: rates stay true.
+        at, until : simulated times, s; None: now, never.
+        sizes : ``size``, ``rate``, ``period``, ``delay``, ``onset``: what the kind needs.
+
+        Returns
+        -------
+        float
+            Simulated time at which it begins, s.
+
+        Raises
+        ------
+        NoAnswerError, RefusedError
+        """
+        given = sizes | ({} if victim is None else {"as": float(victim)})
+        check_attack(kind, given)
+        if kind == "none" and (until is not None or signals):
+            raise StationError("none: ends every lie, and takes no until and no signals")
+        if until is not None and until <= (at or 0.0):
+            raise StationError(f"until = {until:g}: must be later than the beginning")
+        self.card(uav)
+        receivers = [one for one in self.uavs if uav in self.card(one).in_neighbours]
+        if to is not None and to not in receivers:
+            heard = f"UAVs {', '.join(map(str, receivers))} do" if receivers else "nobody does"
+            raise StationError(f"UAV {to} does not hear UAV {uav}; {heard}")
+        parameters = {"ATK_KIND": float(KINDS_OF_LIES[kind].code if kind in KINDS_OF_LIES else 0)}
+        if kind != "none":
+            parameters |= {"ATK_UNTIL": 0.0 if until is None else float(_milliseconds(until))}
+            parameters |= {"ATK_SIGNALS": float(self._mask(uav, signals)), "ATK_CONSIST": float(consistent)}
+            fields = {"size": 0.0, "rate": 0.0, "period": 0.0, "delay": 0.0, "onset": 0.0, "as": 0.0} | given
+            known = (*KINDS_OF_LIES[kind].needs, *KINDS_OF_LIES[kind].takes)
+            parameters |= {f"ATK_{name.upper()}": fields[name] for name in known}
+        for name, value in parameters.items():
+            as_float32(name, value)
+        if victim is not None:
+            both = [one for one in receivers if victim in self.card(one).in_neighbours and to in (None, one)]
+            if not both:
+                raise StationError(f"as = {victim}: nobody who is asked hears both UAV {uav} and UAV {victim}")
+            targets = [(one, uav) for one in both]
+        elif to is not None:
+            targets = [(to, uav)]
+        else:
+            # The truth ends also what is false on single edges.
+            targets = [(uav, 0), *((one, uav) for one in receivers if kind == "none")]
+        began: list[float] = []
+
+        def lie(target: tuple[int, int]) -> None:
+            who, instance = target
+            for name, value in parameters.items():
+                self.set(who, name, value)
+            began.append(self.inject(who, "radio", "wrong", instance, at=at))
+
+        by_uav = dict(targets)
+        problems = self._each(by_uav, lambda who: lie((who, by_uav[who])))
+        if problems:
+            raise RefusedError(f"done in part only: {'; '.join(problems)}")
+        return max(began)
+
+    def _mask(self, uav: int, signals: Sequence[str]) -> int:
+        """What ATK_SIGNALS is for some signals of a UAV."""
+        if not signals:
+            return 0
+        # Imported here: it loads numba, which no other command needs.
+        from ftcc.airside.schemes import find
+
+        flown = tomllib.loads((Path(self.entry.folder) / "scenario.toml").read_text(encoding="utf-8"))
+        role = self.card(uav).role
+        names = [quantity.name for quantity in find(flown["scheme"]).shared.get(role, ())]
+        if unknown := [name for name in signals if name not in names]:
+            shares = f"it shares {', '.join(names) or 'nothing'}"
+            raise StationError(f"signals: UAV {uav}, a {role}, shares no {', '.join(unknown)}; {shares}")
+        return sum(1 << names.index(name) for name in set(signals))
 
     def fault_tolerance(self, uav: int, on: bool) -> None:
         """Switch the fault tolerance of a UAV's law on or off."""
