@@ -165,7 +165,7 @@ COMMANDS: dict[int, Command] = {
     ),
     _M.MAV_CMD_INJECT_FAILURE: Command(
         lambda services, request: services.failures.inject(request),
-        "see `ftcc failures`; acts at FTCC_AT, sizes from FAIL_*",
+        "see `ftcc failures`; acts at FTCC_AT, sizes from FAIL_*, of lies from ATK_*",
     ),
     _M.MAV_CMD_SET_MESSAGE_INTERVAL: Command(_set_message_interval, "us of simulated time; 0 default, -1 off", True),
     _M.MAV_CMD_GET_MESSAGE_INTERVAL: Command(_get_message_interval, "MESSAGE_INTERVAL", True),

@@ -12,6 +12,7 @@ from ftcc.groundside.report.curves import Flown
 from ftcc.groundside.report.definitions import Figure, Sheet, sheet_of
 from ftcc.groundside.report.diagnosis import diagnosis_sections
 from ftcc.groundside.report.drawing import draw, draw_timeline
+from ftcc.groundside.report.lies import lies_section
 from ftcc.groundside.report.links import links_section, network_section
 from ftcc.groundside.report.overview import overview
 from ftcc.groundside.report.page import (
@@ -110,6 +111,8 @@ def _write(run: Run, folder: Path, look: Look) -> Path:
         compared = compare(sheet, flown)
         page.sections.append(compared_section(compared, sheet.source, mission.form, mission.variants, sheet.notes))
     page.sections.append(events_section(events, svg))
+    if len(run.lies["t"]):
+        page.sections.append(lies_section(run.lies, mission, plates))
     page.sections.append(links_section(run.links, mission, plates))
     if run.network:
         page.sections.append(network_section(run.network))

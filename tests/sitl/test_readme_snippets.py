@@ -48,7 +48,7 @@ SHORTER = {
 
 NEEDS_SWARM = {
     "vehicles": "demo", "fault": "demo", "repair": "demo", "link": "demo", "ftc": "demo", "leader": "demo",
-    "mode": "demo", "param": "demo", "attitude": "directed_attitude",
+    "mode": "demo", "param": "demo", "attitude": "directed_attitude", "attack": "demo",
 }  # fmt: skip
 """Commands to a flying swarm, and the scenario that it flies."""
 
