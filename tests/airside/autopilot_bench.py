@@ -11,7 +11,7 @@ import numpy as np
 
 from ftcc.airside.process import AutopilotProcess
 from ftcc.airside.scheme import Flight
-from ftcc.airside.spec import DiagnosisSpec, Neighbour
+from ftcc.airside.spec import DefenceSpec, DiagnosisSpec, Neighbour
 from ftcc.link.gate import Gate, Go, Limit, Pace, Release, Stop
 from ftcc.link.mavlink import LOOPBACK, SIMULATOR, STATION, Endpoint
 from ftcc.link.messages import StateMessage
@@ -23,7 +23,7 @@ from tests.support.swarm import GRAPH, LEADERS, autopilot, timing
 FLIGHT = Flight(GRAPH, 0.01, 0.05, 0.05, 2.0, False)
 """What the law's conditions are checked against."""
 
-_NO_DIAGNOSIS = DiagnosisSpec()
+_NO_DIAGNOSIS, _NO_DEFENCE = DiagnosisSpec(), DefenceSpec()
 
 
 def forged(z: float, V: float, gamma: float, theta: float, q: float) -> np.ndarray:
@@ -45,6 +45,7 @@ class Bench:
         neighbours: tuple[int, ...] = (),
         uav: int = 1,
         diagnosis: DiagnosisSpec = _NO_DIAGNOSIS,
+        defence: DefenceSpec = _NO_DEFENCE,
         **setting: Any,
     ) -> None:
         self.uav = uav
@@ -59,7 +60,7 @@ class Bench:
         self.vehicle = Endpoint(uav, SIMULATOR, ports.vehicle, (LOOPBACK, ports.autopilot))
         self.station = Endpoint(STATION, 1, self.block.station)
         edges = tuple(Neighbour(other, 0.5) for other in neighbours)
-        spec = autopilot(uav, neighbours=edges, flight=FLIGHT, diagnosis=diagnosis)
+        spec = autopilot(uav, neighbours=edges, flight=FLIGHT, diagnosis=diagnosis, defence=defence)
         # Nobody waits for neighbours that are not there.
         self.process = AutopilotProcess([spec], shared, Gate(pipe, gone=set(neighbours)))
         self._thread = threading.Thread(target=self.process.fly)

@@ -30,8 +30,10 @@ def everybody_hears_everybody(scheme: str) -> list[dict[str, Any]]:
 
 
 def led_astray(**defence: Any) -> Flight:
-    """Six followers that hear each other, two honest leaders, and a third "leader", 9, that climbs to 1140 m: a stubborn
-    liar, whose say is as great as that of an honest leader."""
+    """Six followers that hear each other, two honest leaders, and a third "leader", 9, that climbs to 1140 m.
+
+    It is a stubborn liar, whose say is as great as that of an honest leader.
+    """
     filtered = {"frequency": 0.05, "damping": 0.9}
     liar = {
         "y": 40.0,
@@ -79,20 +81,23 @@ def test_who_leaves_whom_out_is_an_event_and_stands_with_the_links():
     assert (links["trust"][last & np.isin(links["sender"], [7, 8])] == 1.0).all()
 
 
+SETTLED = {"finite_time_containment": 60.0}
+"""Time in which followers get to their places, s; in other schemes they begin there."""
+
+
 @pytest.mark.filterwarnings("ignore::ftcc.groundside.ScenarioWarning")
 @pytest.mark.parametrize("scheme", names())
-def test_w_msr_among_honest_neighbours_leaves_a_flight_as_it_should_be(scheme):
+def test_w_msr_among_honest_neighbours_leaves_the_verdict_as_it_is(scheme):
     """Everybody hears everybody, leaders are trusted; the gate lets every honest record pass."""
-    gate = {"jump": 3.0, "jump_angle": 0.2, "most_speed": 60.0, "most_turn": 2.0}
-    settings = {
-        "graph": {"edges": everybody_hears_everybody(scheme)},
-        "defence": {"F": 1, "trusted": ["leaders"], **gate},
-    }
-    flight = simulate(scheme, form="flight", settings=settings, duration=8.0)
-    assert flight.verdict.word == "as it should be"
-    assert not [event for event in flight.events if event[2] == "warning" and "distrusts" in event[3]]
-    left = flight.link_table()["trust"]
-    assert left.min() < 1.0  # it did leave out some
+    gate = {"jump": 1.0, "jump_speed": 2.0, "jump_angle": 0.1, "most_speed": 60.0, "most_accel": 20.0, "most_turn": 2.0}
+    graph = {"graph": {"edges": everybody_hears_everybody(scheme)}}
+    duration = SETTLED.get(scheme, 8.0)
+    alone = simulate(scheme, form="flight", settings=graph, duration=duration)
+    defence = {"F": 1, "trusted": ["leaders"], **gate}
+    defended = simulate(scheme, form="flight", settings={**graph, "defence": defence}, duration=duration)
+    assert defended.verdict.word == alone.verdict.word != "failed"
+    assert not [event for event in defended.events if "distrusts" in event[3]]
+    assert (alone.link_table()["trust"] == 1.0).all()
 
 
 PLAIN = """
