@@ -157,7 +157,7 @@ def scenario_fields() -> str:
             "    ftcc check demo",
             "",
             "[Scenarios](../groundside/scenarios/README.md) explains files, forms, variants and claims;",
-            "[gains](gains.md) lists what `[gains]` and `[diagnosis.gains]` take.",
+            "[gains](gains.md) lists what `[gains]`, `[diagnosis.gains]` and `[defence]` take.",
             "",
             *(_section(one, tables) for one in tables.values()),
         )

@@ -11,6 +11,7 @@ from reference_fields import scenario_fields, sheet_fields
 from reference_python import python_api
 
 from ftcc.airside import schemes
+from ftcc.airside.defence.gains import DEFENCE_RANGES, DefenceGains
 from ftcc.airside.diagnosis.gains import DIAGNOSIS_RANGES, DiagnosisGains
 from ftcc.airside.gcs import BELIEF_FIELDS, COMMANDS, LINK_FIELDS, MESSAGES
 from ftcc.airside.gcs.streams import STREAMS
@@ -171,7 +172,7 @@ def _gain_rows(known: Mapping[str, Any], ranges: Mapping[str, Range], flown: Map
 
 
 def gains() -> str:
-    """The gains of every scheme of this repository, and the settings of diagnosis."""
+    """The gains of every scheme of this repository, and the settings of diagnosis and of defences."""
     sections = [
         "# Gains of the schemes\n\nThe monograph's value, the one that the form `flight` replaces it by, and the range"
         ' beyond which a value is refused. "(not in paper)" marks what a form adds. A gain is set in a scenario, for'
@@ -189,12 +190,16 @@ def gains() -> str:
         )
         if scheme.switches:
             sections.append(table(("switch", "what `false` sets"), switches))
-    ranges = {name: allowed for allowed, names in DIAGNOSIS_RANGES.items() for name in names.split()}
-    rows = ((*row[:4], row[5]) for row in _gain_rows(quantities(DiagnosisGains), ranges, {}))
-    sections.append(
-        "## Diagnosis\n\nSettings of [diagnosis](../docs/diagnosis.md), under `[diagnosis.gains]`.\n\n"
-        + table(("setting", "unit", "meaning", "default", "range"), rows)
+    others = (
+        ("Diagnosis", "[diagnosis](../docs/diagnosis.md), under `[diagnosis.gains]`", DiagnosisGains, DIAGNOSIS_RANGES),
+        ("Defence", "[defences](../docs/defences.md), under `[defence]`", DefenceGains, DEFENCE_RANGES),
     )
+    for title, where, record, allowed_names in others:
+        ranges = {name: allowed for allowed, names in allowed_names.items() for name in names.split()}
+        rows = ((*row[:4], row[5]) for row in _gain_rows(quantities(record), ranges, {}))
+        sections.append(
+            f"## {title}\n\nSettings of {where}.\n\n" + table(("setting", "unit", "meaning", "default", "range"), rows)
+        )
     return "\n".join(sections)
 
 

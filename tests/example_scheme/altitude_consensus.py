@@ -55,7 +55,7 @@ def start(own, heard, reference, model, gains):
 def step(s, own, heard, reference, model, gains, dt):
     pull = 0.0
     for j in range(heard.weight.shape[0]):
-        pull += heard.valid[j] * heard.weight[j] * (heard.values[j, 0] - s.z_r)
+        pull += heard.valid[j] * heard.weight[j] * heard.trust[j, 0] * (heard.values[j, 0] - s.z_r)
     rate = clip(gains.k_c * pull, -gains.climb, gains.climb)
     S1, S2 = own.z - s.z_r, own.V - reference.V
     gamma = clip((rate - gains.k_z * S1) / own.V, -0.15, 0.15)
