@@ -46,6 +46,30 @@ def test_sixteen_processes_equal_the_simulation(fly: Callable[..., Flight], simu
     assert same_flight(flight.folder, simulated())
 
 
+def test_who_distrusts_whom_is_the_same_in_processes(fly: Callable[..., Flight], tmp_path: Path) -> None:
+    """Every defence at once, and a liar from 2 s on."""
+    import pyarrow.parquet as pq
+
+    from ftcc.groundside import simulate
+
+    settings = [
+        "defence={F=1, jump=1.0, past=1.0, crowd=30.0, oldest=1.0, hull=1}",
+        'attacks=[{at=2.0, kind="offset", uav=2, size=40.0}]',
+    ]
+    options = [word for setting in settings for word in ("--set", setting)]
+    flight = fly("containment", "--speed", "max", "--duration", "6", "--seed", "1", "--pack", "auto", *options)
+    assert flight.wait() == 0, flight.output
+    alone = tmp_path / "alone"
+    simulate("containment", alone, form="flight", settings=settings, seed=1, duration=6.0)
+    assert same_flight(flight.folder, alone)
+    assert min(pq.read_table(alone / "links.parquet").column("trust").to_pylist()) < 0.2
+    told = [
+        {(event["t"], event["uav"], event["text"]) for event in events(folder) if "distrusts" in str(event["text"])}
+        for folder in (flight.folder, alone)
+    ]
+    assert told[0] == told[1] != set()
+
+
 def test_with_loss_on_a_loaded_machine_too(
     fly: Callable[..., Flight], simulated: Callable[..., Path], busy_machine: None
 ) -> None:
