@@ -19,7 +19,7 @@ DRAWS = 20
 
 def test_every_scheme_has_a_study() -> None:
     studied = sorted(name for name, file in shipped().items() if "study" in read(file))
-    assert tuple(studied) == ("active", *STUDIED)
+    assert tuple(studied) == tuple(sorted(("active", "liar", *STUDIED)))
 
 
 @pytest.mark.parametrize("name", STUDIED)
@@ -39,3 +39,10 @@ def test_the_study_of_active_compares_what_active_fault_tolerance_adds() -> None
     assert plan.question.endswith("?")
     assert [case for case, _ in plan.documents] == ["flight", "flight+alone", "flight+passive"]
     assert all(plan.drawn(plan.trial(3 * draw))[1] is not None for draw in range(DRAWS)), "the fault needs no trim"
+
+
+def test_the_study_of_liar_draws_liars_that_can_fly_with_and_without_defence() -> None:
+    plan = plan_study("liar")
+    assert plan.question.endswith("?")
+    assert [case for case, _ in plan.documents] == ["flight", "flight+defended"]
+    assert all(plan.drawn(plan.trial(2 * draw))[1] is not None for draw in range(DRAWS))
