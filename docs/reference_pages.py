@@ -23,6 +23,8 @@ from ftcc.groundside.cli.app import app
 from ftcc.groundside.cli.examples import EXAMPLES
 from ftcc.groundside.simulation.flight import recorded_columns
 from ftcc.link.actuators import by_slot
+from ftcc.link.attacks import ATTACK_SIZES
+from ftcc.link.attacks import KINDS as LIES
 from ftcc.link.failures import FAILURES, KINDS, SIZES, UNITS
 from ftcc.link.mavlink import dialect
 from ftcc.link.recording import LINK_COLUMNS
@@ -90,6 +92,14 @@ def mavlink() -> str:
         (code(one.name), code(one.keyword), f"{one.default:g}", f"{one.low:g} to {one.high:g}", one.unit, one.meaning)
         for one in SIZES
     )
+    lies = (
+        (str(kind.code), code(name), cell(kind.formula), cell(kind.does), *map(", ".join, (kind.needs, kind.takes)))
+        for name, kind in LIES.items()
+    )
+    lie_sizes = (
+        (code(one.name), f"{one.default:g}", f"{one.low:g} to {one.high:.10g}", one.unit, cell(one.meaning))
+        for one in ATTACK_SIZES
+    )
     return "\n".join(
         (
             "# MAVLink messages and commands",
@@ -127,6 +137,14 @@ def mavlink() -> str:
             "",
             table(("unit", "instances", "type", "means", "size from"), failures),
             table(("parameter", "in Python and scenarios", "default", "range", "unit", "meaning"), sizes),
+            "## Lies",
+            "",
+            "What a UAV tells its neighbours instead of the truth, see [attacks](../docs/attacks.md): the type WRONG of",
+            "the unit SYSTEM_MAVLINK_SIGNAL, with these parameters. x is the true value, c the size, r the rate, s the",
+            "time since the beginning.",
+            "",
+            table(("ATK_KIND", "kind", "is told", "meaning", "needs", "may have"), lies),
+            table(("parameter", "default", "range", "unit", "meaning"), lie_sizes),
         )
     )
 
@@ -234,6 +252,12 @@ def columns() -> str:
     sections.append(
         "## Links\n\nThe columns of `links.parquet`, a row per edge and report.\n\n"
         + table(headings, ((code(one.name), cell(one.unit), cell(one.meaning)) for one in LINK_COLUMNS))
+    )
+    known = {column.name: column for name in rows for column in resolve(load(name)).lie_columns}
+    sections.append(
+        "## Lies\n\nThe columns of `lies.parquet`, a row per false record, see [attacks](../docs/attacks.md); of each"
+        " scheme those of the values that it shares.\n\n"
+        + table(headings, ((code(one.name), cell(one.unit), cell(one.meaning)) for one in known.values()))
     )
     return "\n".join(sections)
 

@@ -164,7 +164,12 @@ class Failures:
         if isinstance(lie, Answer):
             return lie
         # What was to end later ends here, or is replaced.
-        self._armed = [entry for entry in self._armed if entry[0] <= at_us or entry[3] not in (lie.begins, lie.ends)]
+        over = (lie.begins, lie.ends)
+        self._armed = [
+            (at, n, severity, text, who)
+            for at, n, severity, text, who in self._armed
+            if at <= at_us or text not in over
+        ]
         heapq.heapify(self._armed)
         self._arm(request, "warning" if lie.ends else "info", lie.begins, at_us)
         if lie.until_us != FOR_EVER:
