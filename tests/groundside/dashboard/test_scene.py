@@ -10,7 +10,7 @@ import pytest
 
 from ftcc.groundside.dashboard.scene import LANE
 from ftcc.groundside.dashboard.snapshot import Snapshot
-from ftcc.groundside.palette import CUT, FRESH, GRAY, STALE, colors
+from ftcc.groundside.palette import CUT, DOUBTED, FRESH, GRAY, STALE, colors
 from tests.groundside.dashboard.recorded import at, make, rows
 from tests.groundside.dashboard.synthetic_swarm import CUT as CUT_FROM_TO
 from tests.groundside.dashboard.synthetic_swarm import FOLLOWERS, GRAPH, LEADERS, snapshot
@@ -66,6 +66,23 @@ def test_edges_are_coloured_by_their_state(
     rgba = np.uint32(at(recording, "/world/links", "Arrows3D:colors", t)[EDGES.index(edge)])
     assert tuple(int(rgba >> shift & 0xFF) for shift in (24, 16, 8)) == color
     assert at(recording, "/graph/links", "Arrows2D:colors", t)[EDGES.index(edge)] == rgba
+
+
+def test_an_edge_whose_sender_is_distrusted_has_a_colour_and_a_note_of_its_own(tmp_path: Path) -> None:
+    snap = snapshot(5.0)
+    receiver, sender = 1, min(snap.uavs[1].links)
+    state = snap.uavs[receiver]
+    doubted = {**state.links, sender: dataclasses.replace(state.links[sender], trust=0.27)}
+    uavs = {**snap.uavs, receiver: dataclasses.replace(state, links=doubted)}
+    dashboard = make(tmp_path / "swarm.rrd")
+    dashboard.log(Snapshot(5.0, uavs))
+    dashboard.close()
+    rgba = np.uint32(
+        at(tmp_path / "swarm.rrd", "/graph/links", "Arrows2D:colors", 5.0)[EDGES.index((sender, receiver))]
+    )
+    assert tuple(int(rgba >> shift & 0xFF) for shift in (24, 16, 8)) == DOUBTED
+    assert "trust 0.2" in at(tmp_path / "swarm.rrd", "/graph/notes", "Points2D:labels", 5.0)
+    assert f"distrusts {sender}" in at(tmp_path / "swarm.rrd", "/swarm", "TextDocument:text", 5.0)[0]
 
 
 def test_a_formation_that_spreads_is_not_put_into_lanes(tmp_path: Path) -> None:

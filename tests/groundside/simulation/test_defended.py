@@ -6,12 +6,14 @@ import itertools
 import os
 import subprocess
 import sys
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ftcc.airside.schemes import names
+from ftcc.airside.law_checks import ignores_trust
+from ftcc.airside.schemes import find, names
 from ftcc.groundside import Flight, ScenarioError, load, simulate
 from ftcc.groundside.scenario import resolve
 
@@ -151,3 +153,20 @@ def test_wrong_defences_are_refused(defence, text):
     with pytest.raises(ScenarioError) as refused:
         check(**defence)
     assert text in str(refused.value)
+
+
+@pytest.mark.parametrize("scheme", names())
+def test_every_law_weighs_by_trust(scheme):
+    assert ignores_trust([find(scheme).module]) is None
+
+
+def test_a_law_that_sums_without_trust_is_named(tmp_path):
+    module = ModuleType("mine")
+    module.__file__ = str(tmp_path / "mine.py")
+    text = "def step(s, own, heard, reference, model, gains, dt):\n    return heard.weight[0] * heard.values[0, 0]\n"
+    (tmp_path / "mine.py").write_text(text, encoding="utf-8")
+    assert "does not weigh by heard.trust" in str(ignores_trust([module]))
+    deaf = ModuleType("deaf")
+    deaf.__file__ = str(tmp_path / "deaf.py")
+    (tmp_path / "deaf.py").write_text("def step(s, own):\n    return own.z\n", encoding="utf-8")
+    assert ignores_trust([deaf]) == "the law hears nobody"
