@@ -41,8 +41,11 @@ class Traffic:
     def report(self) -> tuple[int, int, float, float, float]:
         """Received and missing transmissions, mean and longest delay (s), longest silence (s); begins anew."""
         with self._lock:
+            now = time.monotonic()
             mean = self._delays / self._received if self._received else 0.0
-            silence = max(self._silence, 0.0 if self._last is None else time.monotonic() - self._last)
+            if self._last is None:  # nothing has come since the flight began: silence counts from here on
+                self._last = now
+            silence = max(self._silence, now - self._last)
             found = (self._received, self._missing, mean, self._longest, silence)
             self._clear()
             return found

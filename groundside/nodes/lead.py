@@ -17,6 +17,7 @@ from ftcc.groundside.nodes.messages import (
     Delivered,
     ForChild,
     FromChild,
+    GivenUp,
     Join,
     Kill,
     Leaving,
@@ -260,7 +261,13 @@ class Nodes:
         assert node is not None
         node.address = join.address
         return Welcome(
-            self._mission.name, self._folder.name, self._mission.toml, node.vehicles, node.autopilots, self._signed
+            name=self._mission.name,
+            run=self._folder.name,
+            toml=self._mission.toml,
+            vehicles=node.vehicles,
+            autopilots=node.autopilots,
+            signed=self._signed,
+            timeout=self.plan.timeout,
         )
 
     # The processes there.
@@ -365,6 +372,8 @@ class Nodes:
                     came += self._give_up(node, f"node {name} left: {why}")
                 case False if not node.delivered:
                     came += self._give_up(node, f"node {name} at {node.address} is gone")
+                case True if node.gone:
+                    self._control.send(for_node(name, "message"), GivenUp())
                 case FileError():
                     came.append((None, EventReport("error", f"node {name}: {what}")))
         came += [(None, EventReport("warning", text)) for text in self._control.refusals()]

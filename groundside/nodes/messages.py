@@ -33,6 +33,7 @@ __all__ = [
     "Delivered",
     "ForChild",
     "FromChild",
+    "GivenUp",
     "Join",
     "Kill",
     "Leaving",
@@ -89,6 +90,8 @@ class Welcome:
     autopilots: tuple[int, ...]
     signed: bool
     """Whether MAVLink to the ground is signed: then the node needs the key file."""
+    timeout: float
+    """Silence after which each counts the other as gone, wall s."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,6 +130,11 @@ class Kill:
 
 
 @dataclasses.dataclass(frozen=True)
+class GivenUp:
+    """Lead -> node that was gone and is back: the others fly on without it."""
+
+
+@dataclasses.dataclass(frozen=True)
 class Leaving:
     """Node -> lead: it ends before its processes do."""
 
@@ -141,7 +149,7 @@ class Delivered:
 
 
 _GATE = (Ended, EventReport, Go, Gone, Held, LawFailed, Limit, Lost, NetworkReport, Pace, Ready, Release, Stop)
-_OURS = (Delivered, Exited, Join, Kill, Leaving, Placed, Refused, Start, Welcome)
+_OURS = (Delivered, Exited, GivenUp, Join, Kill, Leaving, Placed, Refused, Start, Welcome)
 _TYPES = {kind.__name__: TypeAdapter(kind) for kind in (*_GATE, *_OURS)}
 
 

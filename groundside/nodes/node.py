@@ -18,6 +18,7 @@ from ftcc.groundside.nodes.messages import (
     Delivered,
     ForChild,
     FromChild,
+    GivenUp,
     Join,
     Kill,
     Leaving,
@@ -45,10 +46,13 @@ __all__ = ["NodeOptions", "run_node"]
 
 _ASK = 2.0
 """Longest wait for the answer of a leading computer, wall s."""
+_UNTIL_WELCOME = 10.0
+"""Silence after which a link is given up before the plan's timeout is known, wall s."""
 _PAUSE = 0.5
 """Wall time between two questions whether it is there, s."""
 _FLUSH = 0.2
 """Wall time for a last message to leave, s."""
+_LEAD_GONE = "the leading computer is gone"
 _END_TIMEOUT = 5.0
 """Time for processes to end by themselves where the leading computer is gone, wall s."""
 
@@ -71,7 +75,6 @@ class NodeOptions:
     """Folder of keys; None: nothing is encrypted."""
     key: Path | None = None
     """Key file for signed MAVLink messages to the ground."""
-    timeout: float = 30.0
 
 
 def run_node(
@@ -98,14 +101,17 @@ def run_node(
         host, port = options.lead
         shown = f"[{host}]" if ":" in host else host
         endpoint = f"{'tls' if options.tls else 'tcp'}/{shown}:{port}"
-        rights = node_access(PLANE, options.name)
-        control = ControlPlane(None, endpoint, options.timeout, options.tls, node_name(options.name), rights)
-        stack.callback(control.close)
         say(f"node {options.name}: waiting for the swarm at {shown}:{port}")
+        welcome = _let_in(endpoint, options, say)
+        # Each end of a link tells the other after which silence it is to be given up, so both need the plan's.
+        control = _linked(endpoint, options, welcome.timeout)
+        stack.callback(control.close)
         control.listen_for_messages(for_node(options.name, "message"), "lead")
-        welcome = _join(control, options, say)
-        control.live(from_node(options.name, "alive"))
         control.watch_lead(lambda there: control.keep("lead", there))
+        if not _is_there(control, welcome.timeout):
+            say(f"{_LEAD_GONE} before the flight began")
+            return False
+        control.live(from_node(options.name, "alive"))
         node = _Node(options, control, welcome, say)
         with _said_to_lead(control, options.name):
             node.place(load, new_folder, stack)
@@ -113,7 +119,7 @@ def run_node(
             if start is not None:
                 node.require_keys(start)
         if start is None:
-            say("the leading computer is gone before the flight began")
+            say(f"{_LEAD_GONE} before the flight began")
             return False
         return node.fly(start, stack)
 
@@ -128,6 +134,33 @@ def _said_to_lead(control: ControlPlane, name: str) -> Iterator[None]:
         control.send(from_node(name, "message"), Leaving(why))
         time.sleep(_FLUSH)
         raise
+
+
+def _linked(endpoint: str, options: NodeOptions, timeout: float) -> ControlPlane:
+    """Return a session towards the leading computer, to be given up after ``timeout`` s of silence."""
+    rights = node_access(PLANE, options.name)
+    return ControlPlane(None, endpoint, timeout, options.tls, node_name(options.name), rights)
+
+
+def _let_in(endpoint: str, options: NodeOptions, say: Callable[[str], None]) -> Welcome:
+    """Ask by a session of its own until the leading computer answers."""
+    control = _linked(endpoint, options, _UNTIL_WELCOME)
+    try:
+        return _join(control, options, say)
+    finally:
+        control.close()
+
+
+def _is_there(control: ControlPlane, seconds: float) -> bool:
+    """Wait until the link to the leading computer stands; return whether it does within ``seconds``."""
+    until = time.monotonic() + seconds
+    with selectors.DefaultSelector() as selector:
+        selector.register(control, selectors.EVENT_READ)
+        while (left := until - time.monotonic()) > 0.0:
+            selector.select(left)
+            if ("lead", True) in control.take():
+                return True
+    return False
 
 
 def _join(control: ControlPlane, options: NodeOptions, say: Callable[[str], None]) -> Welcome:
@@ -177,6 +210,9 @@ class _Node:
         self.released = False
         self.stopping_since: float | None = None
         self.lead_gone = False
+        """For good: its processes end then."""
+        self.given_up = False
+        """Whether the leading computer has said so."""
 
     def send(self, message: Any) -> None:
         """Send a message to the leading computer."""
@@ -237,7 +273,8 @@ class _Node:
             self._run_until_ended()
             raise
         if self.lead_gone:
-            self.say(f"node {self.options.name}: the leading computer is gone; recorded in {self.folder}")
+            why = "the swarm flies on without this node, which it had lost" if self.given_up else _LEAD_GONE
+            self.say(f"node {self.options.name}: {why}; recorded in {self.folder}")
         else:
             self.say(f"node {self.options.name}: over; recorded in {self.folder}")
         return not self.lead_gone
@@ -337,10 +374,12 @@ class _Node:
                     # On the wall clock the hosts' clocks count, which NTP keeps; in lockstep nothing depends on it.
                     offset = self.offset.seconds if self.local.setting.lockstep else 0.0
                     self.by_name[name].send(with_monotonic(message, offset))
-                case False:
+                case False | GivenUp():
                     self.lead_gone = True
-                case True:
-                    self.lead_gone = False
+                    self.given_up = self.given_up or isinstance(what, GivenUp)
+                case True if self.lead_gone:
+                    # It may not have missed this node, whose processes end now.
+                    self.send(Leaving("it had lost the leading computer"))
 
     def _deliver(self) -> None:
         """Send home what the processes recorded."""

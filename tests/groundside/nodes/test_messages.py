@@ -64,7 +64,7 @@ GATE = [
 OURS = [
     Join("a", "demo", (1, 2), None, "ftcc-sitl 0.1", "10.0.0.2", True),
     Refused("no"),
-    Welcome("demo", "demo-1", "title = 'x'", (1,), (1, 2), False),
+    Welcome("demo", "demo-1", "title = 'x'", (1,), (1, 2), False, 30.0),
     Placed("a:/tmp/run", 20000, 1e-3, 2e-3),
     Start(
         parts=(Part("vehicle", (1, 2)),),
