@@ -54,25 +54,52 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="package")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Keys of all, for an encrypted mesh."""
+    folder = tmp_path_factory.mktemp("keys") / "mesh"
+    made = ["--swarm", "twelve", "--uavs", "1-12", "--node", "b", "--node", "c"]
+    subprocess.run([*FTCC, "keys", "mesh", str(folder), *made], check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
 class HostedFlight:
     """A flight that host a leads, with the nodes b and c on the hosts of these names.
+
+    Parameters
+    ----------
+    hosts : the network.
+    folder : where all is recorded.
+    timeout : of the plan, s.
+    keys : folder of keys; None: nothing is encrypted.
 
     Attributes
     ----------
     run : folder of the run on the leading computer.
     """
 
-    def __init__(self, hosts: list[Host], folder: Path, timeout: float = 30.0) -> None:
+    def __init__(self, hosts: list[Host], folder: Path, timeout: float = 30.0, keys: Path | None = None) -> None:
         self.hosts = {host.name: host for host in hosts}
         self.run = folder / "run"
         self._folder = folder
+        self._secrecy = ["--insecure"] if keys is None else ["--tls", str(keys)]
         self._plan = folder / "nodes.toml"
         self._plan.write_text(PLAN.format(address=hosts[0].address, port=PORT, timeout=timeout))
         self._processes: dict[str, subprocess.Popen[str]] = {}
 
     def start(self, scenario: Path, *arguments: str) -> None:
         """Start all three."""
-        options = ["--nodes", str(self._plan), "--insecure", "--pack", "4", "--viewer", "none", "--out", str(self.run)]
+        options = [
+            "--nodes",
+            str(self._plan),
+            *self._secrecy,
+            "--pack",
+            "4",
+            "--viewer",
+            "none",
+            "--out",
+            str(self.run),
+        ]
         self.start_on("a", "fly", str(scenario), *options, *arguments)
         for name in "bc":
             self.start_node(name)
@@ -80,7 +107,8 @@ class HostedFlight:
     def start_node(self, name: str) -> None:
         """Start `ftcc node` on a host."""
         join = f"{self.hosts['a'].address}:{PORT}"
-        self.start_on(name, "node", "--join", join, "--name", name, "--insecure", "--out", str(self.part_of(name)))
+        options = ["--join", join, "--name", name, *self._secrecy, "--out", str(self.part_of(name))]
+        self.start_on(name, "node", *options)
 
     def part_of(self, name: str) -> Path:
         """Folder of what a node records."""

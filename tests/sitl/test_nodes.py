@@ -12,6 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from ftcc.groundside import Run
 from ftcc.link.codec import Codec
 from ftcc.link.gcs_sockets import LISTENERS
 from tests.sitl.conftest import FTCC, Flight, events, same_flight
@@ -156,6 +157,31 @@ def test_commands_reach_every_computer_and_who_leaves_is_named(
     left = str(tmp_path / "b-1")
     assert any(left in text for text in texts)
     assert list(Path(left, "parts").glob("5-*.arrows"))
+
+
+def test_nodes_are_started_by_ssh(
+    fly: Callable[..., Flight], port: int, environment: dict[str, str], tmp_path: Path
+) -> None:
+    """Instead of ssh, a script of that name runs here what it is told to run there."""
+    (tmp_path / "bin").mkdir()
+    ssh = tmp_path / "bin" / "ssh"
+    ssh.write_text(f'#!/bin/sh\nprintf "%s\\n" "$3" >> {tmp_path}/called\ncd {tmp_path} && exec sh -c "$4"\n')
+    ssh.chmod(0o755)
+    environment["PATH"] = f"{ssh.parent}:{environment['PATH']}"
+    plan = tmp_path / "nodes.toml"
+    entry = '[[nodes]]\nname = "{0}"\nuavs = "{1}"\nssh = "pilot@{0}"\ncommand = "{2}"\n'
+    nodes = [entry.format(name, uavs, " ".join(FTCC)) for name, uavs in (("a", "1-2"), ("b", "3-4"))]
+    plan.write_text(f'listen = "127.0.0.1:{port}"\n{"".join(nodes)}')
+    asked = ("containment", "--duration", "1", "--speed", "max", "--pack", "2", "--mavlink", "none")
+    flight = fly(*asked, "--nodes", str(plan), "--ssh", "--insecure")
+    assert flight.wait() == 0, flight.output
+    assert sorted((tmp_path / "called").read_text().split()) == ["pilot@a", "pilot@b"]
+    for name in "ab":
+        log = (flight.folder / "logs" / f"node-{name}.log").read_text()
+        assert f"node {name}: joined run" in log
+        assert f"node {name}: over; recorded in" in log
+    run = Run(flight.folder)
+    assert set(run.uavs) >= set(run.mission.graph.followers)
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ import typer
 from ftcc.groundside import load, resolve
 from ftcc.groundside.cli import main
 from ftcc.groundside.cli.app import app
+from ftcc.groundside.nodes import read_plan
 from ftcc.groundside.scenario.loading import read, shipped
 from ftcc.groundside.swarm.registry import ask_swarm, find_swarm
 from ftcc.link.compiled import SCHEME_ENTRY_POINTS
@@ -75,6 +76,12 @@ NOT_RUN = {
     "ftcc fly jsbsim_attitude": "compiles a minute for what tests/sitl/test_schemes.py shows on another law",
     "ftcc simulate jsbsim_fire": "likewise; tests/groundside/scenario/test_jsbsim.py checks the scenario",
     "jsbsim --root=. --script=": "is JSBSim's: tests/groundside/jsbsim/test_referee.py",
+    "ftcc keys mesh mesh-keys --swarm twelve": "makes keys for what follows: tests/hosts/test_swarm.py",
+    "ftcc keys mesh mesh-keys --bundle of-a --uavs 1-2,8": "likewise",
+    "ftcc keys mesh mesh-keys --bundle of-b --uavs 3-6": "likewise",
+    "ftcc fly twelve.toml --nodes": "needs two other computers: tests/hosts/test_swarm.py",
+    "ftcc node --join": "needs a computer that leads: tests/hosts/test_swarm.py",
+    "docs/several-computers.md drawing": "is a drawing, or the configuration of a router",
     "docker": "needs a container engine",
     "ssh": "needs another computer",
     "scp": "needs another computer",
@@ -332,6 +339,11 @@ def test_a_piece_of_toml_is_taken(block: Block, tmp_path: Path) -> None:
         assert all(isinstance(module, str) for module in offered[SCHEME_ENTRY_POINTS].values())
         if block.page == LAW:
             assert offered == tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]["entry-points"]
+        return
+    if "listen" in said:
+        plan = tmp_path / "nodes.toml"
+        plan.write_text(block.text)
+        assert [node.name for node in read_plan(plan).nodes] == ["b", "c"]
         return
     scenario = tmp_path / "scenario.toml"
     like = "jsbsim_containment" if said.get("plant", {}).get("model") == "jsbsim" else "containment"
