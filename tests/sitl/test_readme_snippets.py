@@ -65,6 +65,7 @@ NOT_RUN = {
     "arduplane": "needs an ArduPilot",
     "docs/autopilots.md drawing": "is a file for PX4 or ArduPilot",
     "ftcc calibrate": "writes beside a shipped scenario: tests/groundside/studies/test_calibration.py",
+    "ftcc study containment --set diagnosis.on=true": "compiles two minutes; tests/groundside/studies has such studies",
     "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
     "ftcc new ten.toml --scheme my_law": "needs the package installed: tests/groundside/test_new_law.py",
     "ftcc simulate my_law": "needs the package installed: tests/groundside/test_new_law.py",
