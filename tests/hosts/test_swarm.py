@@ -12,7 +12,7 @@ import pytest
 
 from ftcc.groundside import Run
 from ftcc.groundside.report.links import network_section
-from tests.hosts.conftest import FTCC, HostedFlight, clock_offsets
+from tests.hosts.conftest import FTCC, PORT, HostedFlight, clock_offsets
 from tests.hosts.network import Host
 from tests.hosts.wire import Weather
 from tests.sitl.conftest import events, same_flight
@@ -31,6 +31,9 @@ print(*sorted(heard))
 """
 pytestmark = pytest.mark.timeout(600)  # the first start compiles
 
+FLOOD = Path(__file__).with_name("flood.py")
+MESH = 20007
+"""Port of the first autopilot on each host: where nothing else runs, a block of ports begins at 20000."""
 DEAD = 5.0
 """For how long a cable is out, wall s."""
 SPEED = ("--speed", "1")
@@ -40,7 +43,7 @@ SPEED = ("--speed", "1")
 def test_bad_weather_and_a_dead_cable_change_no_bit(
     hosted: Hosted, hosts: list[Host], scenario: Path, keys: Path, tmp_path: Path
 ) -> None:
-    """All is encrypted. A ground station on a fourth computer hears everybody meanwhile."""
+    """All is encrypted. On a fourth computer a ground station hears everybody, and a stranger calls without end."""
     station = hosts[3].run([sys.executable, "-c", STATION, "12"], stdout=subprocess.PIPE)
     assert station.stdout is not None
     assert station.stdout.readline() == "ready\n"
@@ -50,6 +53,8 @@ def test_bad_weather_and_a_dead_cable_change_no_bit(
     flight.wait_until(lambda: "node b at" in flight.output())
     hosts[1].weather(Weather(delay=0.05, loss=0.1, reorder=0.1))
     flight.wait_until_flown(0.5)
+    doors = [f"{hosts[0].address}:{PORT}", *(f"{host.address}:{MESH}" for host in hosts[:3])]
+    flood = hosts[3].run([sys.executable, str(FLOOD), "10000", *doors], stdout=subprocess.PIPE)
     hosts[2].link_down()
     time.sleep(DEAD)
     hosts[2].link_up()
@@ -59,6 +64,9 @@ def test_bad_weather_and_a_dead_cable_change_no_bit(
     assert [flight.wait("b"), flight.wait("c")] == [0, 0], flight.everything()
     heard, _ = station.communicate(timeout=10.0)
     assert heard.split() == [str(uav) for uav in range(1, 13)]
+    calls, _ = flood.communicate(timeout=60.0)
+    assert calls.split()[:2] == ["10000", "0"], "nobody is let in"
+    assert any("packets from unknown addresses dropped" in str(event["text"]) for event in events(flight.run))
     simulated = tmp_path / "simulated"
     subprocess.run([*FTCC, "simulate", str(scenario), *asked, "--out", str(simulated)], check=True)
     assert same_flight(flight.run, simulated)
