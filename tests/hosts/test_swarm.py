@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ftcc.groundside import Run
@@ -130,5 +131,5 @@ def test_on_the_wall_clock_neighbours_age_while_a_cable_is_out_and_come_back(
     edge = (links["uav"] == 1) & (links["sender"] == 10)
     oldest = dict(zip(links["t"][edge], links["oldest"][edge], strict=True))
     assert oldest[1.0] < 0.7
-    assert max(oldest.values()) > 1.0
+    assert np.nanmax(links["oldest"][edge]) > 1.0
     assert oldest[6.0] < 0.7
