@@ -33,7 +33,7 @@ def mesh(
     ] = None,
 ) -> None:
     """Make certificates for an encrypted mesh, or list those of DIR."""
-    from ftcc.link import mesh_authority as authority
+    import ftcc.link.mesh_authority as authority
     from ftcc.link.mesh_keys import AUTHORITY, DAYS, LEAD, MeshKeysError, load_certificate, swarm_of
 
     try:

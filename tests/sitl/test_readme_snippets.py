@@ -95,6 +95,7 @@ NOT_RUN = {
     "python -m tests.typings": "is called by .ci/run: tests/test_packages.py",
     "docs/architecture.md drawing": "is no text to type",
     "docs/compiled.md drawing": "is no text to type",
+    "docs/encrypted-mesh.md drawing": "is no text to type",
     "docs/mesh.md drawing": "is no text to type",
     "docs/tick.md drawing": "is no text to type",
 }
