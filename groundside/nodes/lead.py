@@ -10,27 +10,25 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ftcc.groundside.nodes.clock import Offset, with_unix
 from ftcc.groundside.nodes.control_plane import PLANE, ControlPlane, for_node, from_node
 from ftcc.groundside.nodes.files import FileError, Receiver
+from ftcc.groundside.nodes.known_node import KnownNode, RemoteChild, difference, files_of, flown
 from ftcc.groundside.nodes.messages import (
     Delivered,
     ForChild,
     FromChild,
     GivenUp,
     Join,
-    Kill,
     Leaving,
     Placed,
     Refused,
     Start,
     Welcome,
 )
-from ftcc.groundside.nodes.plan import NodeFields, NodesError, NodesPlan
+from ftcc.groundside.nodes.plan import NodesError, NodesPlan
 from ftcc.groundside.nodes.program import program
 from ftcc.groundside.nodes.relay import GROUND, LISTENER, PAIR, STATION, Relay, route_of
 from ftcc.groundside.swarm import Child, Exited, Part
-from ftcc.groundside.text import ids
 from ftcc.link.addresses import is_loopback, resolve
 from ftcc.link.gate import EventReport
 from ftcc.link.mavlink import LOOPBACK
@@ -54,54 +52,6 @@ _WALL_TIMEOUT = 3.0
 _FAREWELL = 3.0
 """Longest wait for the nodes to leave, wall s."""
 _LOG = "node-{}.log"
-
-
-class _RemoteChild(Child):
-    """A process on a node."""
-
-    def __init__(self, part: Part, send: Callable[[ForChild], None]) -> None:
-        super().__init__(part)
-        self._send = send
-
-    def send(self, message: Any) -> None:
-        self._send(ForChild(self.name, with_unix(message)))
-
-    def kill(self) -> None:
-        self._send(ForChild(self.name, Kill()))
-
-
-@dataclasses.dataclass
-class _Node:
-    """What is known of one node."""
-
-    fields: NodeFields
-    vehicles: tuple[int, ...]
-    autopilots: tuple[int, ...]
-    address: str = ""
-    """Numeric; "" until it has joined."""
-    placed: Placed | None = None
-    relay: Relay | None = None
-    children: dict[str, _RemoteChild] = dataclasses.field(default_factory=dict)
-    receiver: Receiver | None = None
-    delivered: Delivered | None = None
-    gone: bool = False
-    ssh: subprocess.Popen[bytes] | None = None
-
-    @property
-    def name(self) -> str:
-        return self.fields.name
-
-    @property
-    def block(self) -> PortBlock:
-        """The ports that it holds."""
-        assert self.placed is not None
-        return PortBlock(self.placed.port, tuple(sorted({*self.vehicles, *self.autopilots})))
-
-    @property
-    def offset(self) -> Offset:
-        """This computer's clock minus the node's."""
-        assert self.placed is not None
-        return Offset(self.placed.offset, self.placed.uncertainty)
 
 
 class Nodes:
@@ -140,7 +90,7 @@ class Nodes:
         self._tls = tls
         self._started = False
         self._nodes = {
-            node.name: _Node(
+            node.name: KnownNode(
                 node,
                 tuple(spec.uav for spec in mission.vehicles if plan.vehicle_at(spec.uav) == node.name),
                 tuple(spec.uav for spec in mission.vehicles if plan.autopilot_at(spec.uav) == node.name),
@@ -207,7 +157,7 @@ class Nodes:
                 match what:
                     case Placed():
                         node.placed = what
-                        report(f"node {name} at {node.address} flies {_flown(node)}; clock {node.offset}")
+                        report(f"node {name} at {node.address} flies {flown(node)}; clock {node.offset}")
                         self._check_clock(node)
                     case Leaving(why):
                         raise NodesError(f"node {name}: {why}")
@@ -225,7 +175,7 @@ class Nodes:
         if self.plan.known_addresses:
             self._control.ignore_others(port_of(self.endpoint), [node.address for node in self._nodes.values()])
 
-    def _check_clock(self, node: _Node) -> None:
+    def _check_clock(self, node: KnownNode) -> None:
         """Refuse the wall clock where the clock of a node is off."""
         if not self._lockstep and abs(node.offset.seconds) > self.plan.largest_offset + node.offset.uncertainty:
             raise NodesError(
@@ -253,7 +203,7 @@ class Nodes:
         elif join.secured != (self._tls is not None):
             why = "of the two computers one has --tls and the other --insecure"
         else:
-            why = _difference("vehicles", join.vehicles, node.vehicles) or _difference(
+            why = difference("vehicles", join.vehicles, node.vehicles) or difference(
                 "autopilots", join.autopilots, node.autopilots
             )
         if why:
@@ -288,8 +238,8 @@ class Nodes:
         for name, node in self._nodes.items():
             own = tuple(part for part in parts if self._flown_at(part) == name)
             send = self._sender(name)
-            node.children = {part.name: _RemoteChild(part, send) for part in own}
-            node.receiver = Receiver(self._folder, _files_of(node))
+            node.children = {part.name: RemoteChild(part, send) for part in own}
+            node.receiver = Receiver(self._folder, files_of(node))
             node.relay = self._relay_to(node, setting)
             self._control.send(
                 for_node(name, "message"),
@@ -332,7 +282,7 @@ class Nodes:
 
         return send
 
-    def _relay_to(self, node: _Node, setting: Setting) -> Relay:
+    def _relay_to(self, node: KnownNode, setting: Setting) -> Relay:
         """Carry datagrams to and from a node: telemetry, commands, and MAVLink of pairs that are split."""
         name, ours, theirs = node.name, self._ports, node.block
         relay = Relay(lambda data: self._control.send_bytes(for_node(name, "datagram"), data, droppable=True))
@@ -379,7 +329,7 @@ class Nodes:
         came += [(None, EventReport("warning", text)) for text in self._control.refusals()]
         return came
 
-    def _give_up(self, node: _Node, text: str) -> list[tuple[Child | None, Any]]:
+    def _give_up(self, node: KnownNode, text: str) -> list[tuple[Child | None, Any]]:
         """Return what there is to say of a node that is gone; nobody waits for it any more."""
         if node.gone or not self._started:
             return []
@@ -391,7 +341,7 @@ class Nodes:
     def _token_watcher(self, name: str) -> Callable[[bool], None]:
         return lambda there: self._control.keep(name, there)
 
-    def _file_taker(self, node: _Node) -> Callable[[bytes], None]:
+    def _file_taker(self, node: KnownNode) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
             try:
                 if node.receiver is not None:
@@ -401,7 +351,7 @@ class Nodes:
 
         return take
 
-    def _datagram_taker(self, node: _Node) -> Callable[[bytes], None]:
+    def _datagram_taker(self, node: KnownNode) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
             channel, number = route_of(data)
             ends = self.place(number) if channel == PAIR else ("", "")
@@ -449,29 +399,3 @@ class Nodes:
                 if node.ssh.poll() is None:
                     node.ssh.terminate()
                 node.ssh.wait()
-
-
-def _files_of(node: _Node) -> Callable[[str], bool]:
-    """Return which files may come home from a node: the logs of its processes, and the parts of its UAVs."""
-    uavs = {str(uav) for uav in (*node.vehicles, *node.autopilots)}
-
-    def allowed(file: str) -> bool:
-        if file.endswith(".log"):
-            return file.removesuffix(".log") in node.children
-        return file.partition("-")[0] in uavs
-
-    return allowed
-
-
-def _difference(what: str, asked: tuple[int, ...] | None, planned: tuple[int, ...]) -> str:
-    """Return how what a node is to fly differs from the plan; "" if it does not."""
-    if asked is None or asked == planned:
-        return ""
-    return f"it is to fly {what} {ids(asked) or 'none'}, the plan has {ids(planned) or 'none'} there"
-
-
-def _flown(node: _Node) -> str:
-    if node.vehicles == node.autopilots:
-        return f"UAVs {ids(node.vehicles)}"
-    parts = (("vehicles", node.vehicles), ("autopilots", node.autopilots))
-    return " and ".join(f"{what} {ids(uavs)}" for what, uavs in parts if uavs)

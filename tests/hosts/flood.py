@@ -1,6 +1,6 @@
 """``python flood.py COUNT HOST:PORT ...``: as many connections as fast as they go, with junk where one is answered.
 
-Prints how many were begun and how many were let in, in how many seconds. Needs nothing of the project: it is a stranger.
+Prints how many were begun and let in, in how many seconds. Needs nothing of the project: it is a stranger.
 """
 
 from __future__ import annotations
