@@ -64,6 +64,7 @@ NOT_RUN = {
     "PX4_SIM_MODEL": "needs a PX4",
     "arduplane": "needs an ArduPilot",
     "docs/autopilots.md drawing": "is a file for PX4 or ArduPilot",
+    "ftcc search liar": "flies a hundred times; tests/groundside/studies/test_search.py searches",
     "ftcc calibrate": "writes beside a shipped scenario: tests/groundside/studies/test_calibration.py",
     "ftcc study containment --set diagnosis.on=true": "compiles two minutes; tests/groundside/studies has such studies",
     "ftcc replay": "shows a viewer until Ctrl-C: tests/sitl/test_viewing.py",
