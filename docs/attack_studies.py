@@ -223,8 +223,8 @@ def draw_flights(file: Path) -> None:
         flight = simulate("liar", form="flight", variants=variants)
         lies, graph = flight.lie_table(), flight.mission.graph
         (liar,) = {int(uav) for uav in lies["uav"]}
-        led = np.array([flight.column("z", uav) for uav in graph.leaders])
-        axes.fill_between(flight.t, led.min(axis=0), led.max(axis=0), color="0.85", label="leaders' hull")
+        led = np.array([flight.column("z", uav)[::10] for uav in graph.leaders])
+        axes.fill_between(flight.t[::10], led.min(axis=0), led.max(axis=0), color="0.85", label="leaders' hull")
         for uav in graph.followers:
             label = "the liar flies" if uav == liar else "honest followers" if uav == 1 else None
             color, width = ("C3", 1.4) if uav == liar else ("C0", 0.9)
