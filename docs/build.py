@@ -34,7 +34,7 @@ PICTURES = {".png", ".svg", ".gif"}
 LANGUAGES = {".py": "python", ".pyi": "python", ".toml": "toml", ".yaml": "yaml", ".cff": "yaml", ".json": "json"}
 SCRIPTS = ("pictures.py", "scheme_pages.py", "rooms.py")
 """Which draw pictures within minutes."""
-LONG_SCRIPTS = ("active_studies.py", "closures.py", "diagnosis_figures.py", "lying_studies.py")
+LONG_SCRIPTS = ("active_studies.py", "closures.py", "diagnosis_figures.py", "attack_studies.py", "attacked_swarms.py")
 """Measure for far longer: called by hand."""
 
 _FENCE = re.compile(r"(^```.*?^```|`[^`\n]+`)", re.DOTALL | re.MULTILINE)
