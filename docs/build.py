@@ -27,7 +27,7 @@ from mkdocs.exceptions import MkDocsException
 from reference_pages import PAGES
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
+FOLDERS = ("airside", "deploy", "docs", "groundside", "link", "sim", "tests")
 MOVED = {"docs/welcome.md": "index.md", "README.md": "start.md"}
 """Pages that stand elsewhere on the site: it begins with the gallery."""
 PICTURES = {".png", ".svg", ".gif"}

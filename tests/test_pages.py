@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-FOLDERS = ("airside", "docs", "groundside", "link", "sim", "tests")
+FOLDERS = ("airside", "deploy", "docs", "groundside", "link", "sim", "tests")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for name in FOLDERS for page in (ROOT / name).rglob("*.md"))])
 
 
