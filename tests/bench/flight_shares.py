@@ -74,13 +74,13 @@ def _flyer(scheme: str, plant: str) -> Any:
                     elif stage == 2:
                         sense(pilots, i, states[i], controls[i], now)
                     elif stage == 3:
-                        hear(exchange, inbox, events, timing, i, now)
+                        hear(world.attacks, exchange, inbox, events, timing, i, now)
                     elif stage == 4:
                         refer(pilots, inbox, i, now, timing.period_us)
                     elif stage == 5:
                         control(world, timing, i, now)
                     elif stage == 6 and now % timing.exchange_us == 0:
-                        publish(pilots, exchange, events, i, now // timing.exchange_us, now)
+                        publish(pilots, world.attacks, exchange, events, i, now // timing.exchange_us, now)
                 after = monotonic(room)
                 spent[stage] += after - clock
                 clock = after
