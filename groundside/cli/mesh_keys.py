@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,6 @@ from ftcc.groundside.cli.common import fail, terminal
 
 __all__ = ["mesh"]
 
-_RANGE = re.compile(r"([0-9]+)(?:-([0-9]+))?")
 _LAST_UAV = 65535
 
 
@@ -102,18 +100,16 @@ def _names(uavs: str, nodes: list[str], lead: bool) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _numbers(text: str) -> list[int]:
+def _numbers(text: str) -> tuple[int, ...]:
     """The UAVs of "1-4,7"."""
-    numbers: list[int] = []
-    for part in filter(None, text.replace(" ", "").split(",")):
-        found = _RANGE.fullmatch(part)
-        if found is None:
-            fail(f"--uavs {text!r}: {part!r} is no UAV and no range; give them as 1-4,7")
-        first = int(found[1])
-        last = int(found[2] or first)
-        if not 1 <= first <= last <= _LAST_UAV:
-            fail(f"--uavs {text!r}: {part}: UAVs are from 1 to {_LAST_UAV}, the lower one first")
-        numbers += range(first, last + 1)
+    from ftcc.groundside.text import ids_of
+
+    try:
+        numbers = ids_of(text) if text else ()
+    except ValueError as error:
+        fail(f"--uavs {error}")
+    if numbers and not 1 <= numbers[0] <= numbers[-1] <= _LAST_UAV:
+        fail(f"--uavs {text!r}: UAVs are from 1 to {_LAST_UAV}")
     return numbers
 
 
