@@ -10,7 +10,8 @@ from typing import Annotated, NamedTuple
 
 from ftcc.airside import ranges
 from ftcc.airside.ranges import Range
-from ftcc.airside.scheme import Quantity, quantities
+from ftcc.airside.scheme import Quantity
+from ftcc.airside.settings import settings_with
 
 __all__ = ["DEFENCE_RANGES", "DefenceGains", "defence_gains"]
 
@@ -63,13 +64,4 @@ def defence_gains(overrides: Mapping[str, float]) -> DefenceGains:
     ValueError
         For a name that there is not, or a value out of its range.
     """
-    known = quantities(DefenceGains)
-    unknown = [name for name in overrides if name not in known]
-    if unknown:
-        raise ValueError(f"there is no setting {', '.join(unknown)}; there are trusted, {', '.join(known)}")
-    for allowed, names in DEFENCE_RANGES.items():
-        for name in names.split():
-            if name in overrides and (refusal := allowed.refusal(overrides[name])):
-                raise ValueError(f"{name} = {overrides[name]:g}: {refusal}")
-    values = {name: note.published for name, note in known.items()} | dict(overrides)
-    return DefenceGains(**{name: float(value) for name, value in values.items() if value is not None})
+    return settings_with(DefenceGains, DEFENCE_RANGES, overrides, "trusted")  # type: ignore[no-any-return]

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 from ftcc.airside import ranges
-from ftcc.airside.scheme import Quantity, quantities
+from ftcc.airside.scheme import Quantity
+from ftcc.airside.settings import settings_with
 
 __all__ = ["DIAGNOSIS_RANGES", "DiagnosisGains", "diagnosis_gains"]
 
@@ -90,13 +91,4 @@ def diagnosis_gains(overrides: Mapping[str, float]) -> DiagnosisGains:
     ValueError
         For a name that there is not, or a value out of its range.
     """
-    known = quantities(DiagnosisGains)
-    unknown = [name for name in overrides if name not in known]
-    if unknown:
-        raise ValueError(f"diagnosis has no gain {', '.join(unknown)}; it has {', '.join(known)}")
-    for allowed, names in DIAGNOSIS_RANGES.items():
-        for name in names.split():
-            if name in overrides and (refusal := allowed.refusal(overrides[name])):
-                raise ValueError(f"gain {name} = {overrides[name]:g}: {refusal}")
-    values = {name: note.published for name, note in known.items()} | dict(overrides)
-    return DiagnosisGains(**{name: float(value) for name, value in values.items() if value is not None})
+    return settings_with(DiagnosisGains, DIAGNOSIS_RANGES, overrides)  # type: ignore[no-any-return]

@@ -257,8 +257,8 @@ def test_calibrated_thresholds_are_below_all_else(mine: Path) -> None:
     [
         ("[diagnosis]\non = true\n", ":1: diagnosis: only [diagnosis.gains] may stand in this file"),
         ("duration = 3.0\n", ":1: duration: only diagnosis may stand in this file; the rest belongs into mine.toml"),
-        ("[diagnosis.gains]\nlimit_rudder = -1.0\n", ":1: diagnosis.gains: gain limit_rudder = -1: must be"),
-        ("[diagnosis.gains]\nlimit = 1.0\n", "diagnosis has no gain limit"),
+        ("[diagnosis.gains]\nlimit_rudder = -1.0\n", ":1: diagnosis.gains: limit_rudder = -1: must be"),
+        ("[diagnosis.gains]\nlimit = 1.0\n", "there is no setting limit; there are"),
     ],
 )
 def test_wrong_thresholds_are_refused_with_their_line(mine: Path, text: str, problem: str) -> None:
