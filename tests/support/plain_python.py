@@ -15,7 +15,11 @@ from ftcc.groundside import load, resolve
 from ftcc.groundside.scenario.loading import forms_and_variants, read, shipped
 from ftcc.groundside.simulation import fly_in_memory
 
-CASES = [(name, form) for name, path in shipped().items() for form in forms_and_variants(read(path))[0]]
+_TWINS = {"jsbsim_attitude": "jsbsim_containment"}
+"""Scenarios whose plant another one flies already: not compiled once more for this."""
+CASES = [
+    (name, form) for name, path in shipped().items() if name not in _TWINS for form in forms_and_variants(read(path))[0]
+]
 
 
 def digest(scenario: str, form: str, seconds: float) -> str:
