@@ -334,9 +334,9 @@ class Nodes:
         if node.gone or not self._started:
             return []
         node.gone = True
-        left = f"what its processes recorded stays there: {node.placed.folder}" if node.placed else ""
+        left = f"; what its processes recorded stays there: {node.placed.folder}" if node.placed else ""
         exits = [(child, Exited(None, why=text)) for child in node.children.values() if not child.dead]
-        return [(None, EventReport("error", f"{text}; {left}")), *exits]
+        return [(None, EventReport("error", f"{text}{left}")), *exits]
 
     def _token_watcher(self, name: str) -> Callable[[bool], None]:
         return lambda there: self._control.keep(name, there)
@@ -353,8 +353,8 @@ class Nodes:
 
     def _datagram_taker(self, node: KnownNode) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
-            channel, number = route_of(data)
-            ends = self.place(number) if channel == PAIR else ("", "")
+            route = route_of(data)
+            ends = self.place(route[1]) if route and route[0] == PAIR else ("", "")
             if node.name in ends and all(ends):
                 other = ends[1] if ends[0] == node.name else ends[0]
                 self._control.send_bytes(for_node(other, "datagram"), data, droppable=True)

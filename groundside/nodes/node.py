@@ -207,7 +207,6 @@ class _Node:
         self.control = control
         self.welcome = welcome
         self.say = say
-        self.released = False
         self.stopping_since: float | None = None
         self.lead_gone = False
         """For good: its processes end then."""

@@ -31,8 +31,10 @@ _LOOK = 0.5
 """Longest wait of the thread, s: so long may it take until it ends."""
 
 
-def route_of(data: bytes) -> tuple[int, int]:
-    """Return channel and number of a datagram on its way."""
+def route_of(data: bytes) -> tuple[int, int] | None:
+    """Return channel and number of a datagram on its way; None where it is too short to have any."""
+    if len(data) < _HEADER.size:
+        return None
     channel, number, _ = _HEADER.unpack_from(data)
     return channel, number
 

@@ -78,4 +78,5 @@ def test_what_belongs_nowhere_is_counted(relays: tuple[Relay, Relay]) -> None:
     here.deliver(b"")
     here.deliver(b"\x02\x01\x00\x00\x00datagram")
     assert here.dropped == 2
+    assert route_of(b"\x02\x01") is None
     assert route_of(b"\x02\x01\x00\x00\x00datagram") == (LISTENER, 1)
