@@ -64,7 +64,6 @@ class Neighbourhood:
         """Number up to which each receiving process has this one's."""
         self._incoming = new_transmission(_MOST_RECORDS, group.autopilots.shared.shape[1])
         self._mesh: Mesh | None = None
-        self._refusals: RefusalCounter | None = None
         self._texts: RefusalTexts | None = None
         if linked:
             group.on_mesh[0] = 1
@@ -75,12 +74,12 @@ class Neighbourhood:
             # In lockstep an edge is subscribed to at both ends, for the acknowledgements.
             sources, targets = (linked, linked) if setting.lockstep else (senders, receivers)
             far = [peer for peer in linked if setting.is_far(peer)]
-            secured = {}
+            secured, refusals = {}, None
             if setting.tls is not None:
                 rights = uav_access(setting.swarm, me, sources, targets)
                 secured = security(Credentials(setting.tls, uav_name(me)), rights)
                 names = {setting.mesh_endpoint(peer): uav_name(peer) for peer in linked}
-                self._refusals = RefusalCounter(rights, names)
+                refusals = RefusalCounter(rights, names)
             self._mesh = Mesh(
                 setting.swarm,
                 me,
@@ -93,9 +92,9 @@ class Neighbourhood:
                 far,
                 secured,
             )
-            if self._refusals is not None:
-                self._refusals.watch(self._mesh.session)
-                self._texts = RefusalTexts(self._refusals)
+            if refusals is not None:
+                refusals.watch(self._mesh.session)
+                self._texts = RefusalTexts(refusals)
                 if setting.known_addresses and listen:
                     callers = {setting.peers[peer].address for peer in linked if peer in setting.peers}
                     self._texts.door = Door(port_of(listen), callers)
@@ -225,7 +224,5 @@ class Neighbourhood:
         """Leave the mesh."""
         if self._mesh:
             self._mesh.close()
-        if self._texts is not None and self._texts.door is not None:
-            self._texts.door.close()
-        if self._refusals is not None:
-            self._refusals.close()
+        if self._texts is not None:
+            self._texts.close()

@@ -294,6 +294,12 @@ class RefusalTexts:
         self._due = now + self._period
         return texts
 
+    def close(self) -> None:
+        """Close the door and the counter."""
+        if self.door is not None:
+            self.door.close()
+        self._counter.close()
+
 
 def _meaning(text: bytes) -> str:
     for sign, reason in _CALLERS:

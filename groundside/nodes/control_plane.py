@@ -86,18 +86,18 @@ class ControlPlane:
         own: str,
         others: Mapping[str, Rights],
     ) -> None:
-        self._refusals: RefusalCounter | None = None
         self._texts: RefusalTexts | None = None
+        refusals = None
         settings: Mapping[str, Any] = {}
         if tls is not None:
             settings = security(Credentials(tls, own), others)
-            self._refusals = RefusalCounter(others, {connect: LEAD} if connect else {}, messages=False)
+            refusals = RefusalCounter(others, {connect: LEAD} if connect else {}, messages=False)
         self._zenoh = import_zenoh()
         connects = [connect] if connect else []
         self._session = self._zenoh.open(configuration(self._zenoh, listen, connects, timeout, settings))
-        if self._refusals is not None:
-            self._refusals.watch(self._session)
-            self._texts = RefusalTexts(self._refusals)
+        if refusals is not None:
+            refusals.watch(self._session)
+            self._texts = RefusalTexts(refusals)
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
         self._declared: list[Any] = [close_at_once(self._session)]
@@ -210,8 +210,6 @@ class ControlPlane:
             declared.undeclare()
         linger_again()
         self._session.close()
-        if self._texts is not None and self._texts.door is not None:
-            self._texts.door.close()
-        if self._refusals is not None:
-            self._refusals.close()
+        if self._texts is not None:
+            self._texts.close()
         self._bell.close()
