@@ -28,7 +28,7 @@ from ftcc.airside.spec import AutopilotSpec, is_active
 from ftcc.link.compiled import entry_of
 from ftcc.link.gate import Ended, EventReport, Gate, LawFailed, Ready
 from ftcc.link.mavlink import AUTOPILOT, LOOPBACK, Endpoint, ending_message, ends
-from ftcc.link.process import Setting, Stall, Waiter
+from ftcc.link.process import RESEND, Setting, Stall, Waiter
 from ftcc.link.recording import LINK_COLUMNS, Column, Recorder, part_path
 from ftcc.link.timing import Timing
 from ftcc.link.waiting import ATTEND, DATAGRAM, FLOWN, MAIL, WORK
@@ -38,6 +38,8 @@ __all__ = ["AutopilotProcess", "columns", "load_compiled", "main"]
 
 _ATTENTION = 0.02
 """Wall time between two looks at what the ground waits for, s."""
+_UNTIL_RELEASED = 60.0
+"""Longest wait for all others to end, wall s."""
 _SUBSCRIPTIONS = 0.02
 """Wall time between two looks whether all neighbours have subscribed, s."""
 
@@ -323,7 +325,12 @@ class AutopilotProcess:
                 self.gate.report(EventReport("info", f"dropped what came from the ground: {listed}", spec.uav))
         flown = int(self.group.done.max()) + 1
         self.gate.report(Ended(flown, 0, flown * len(self.specs)))
-        self.gate.wait_until_released(60.0)
+        until = time.monotonic() + _UNTIL_RELEASED
+        while not self.gate.released and time.monotonic() < until:
+            # The last command may be lost on its way, between computers for instance: its vehicle waits for it.
+            for i in range(len(self.specs)):
+                send_again(self.group.wire, i)
+            self.gate.wait_until_released(RESEND)
 
     def close(self) -> None:
         """Free the ports; leave the mesh."""
