@@ -13,18 +13,18 @@ import importlib.util
 import itertools
 import math
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
 from ftcc.link import cache
 from ftcc.link.cache import SCHEME_ENTRY_POINTS
+from ftcc.link.numba_messages import reason_of
 
 __all__ = [
     "SCHEME_ENTRY_POINTS",
@@ -43,6 +43,7 @@ __all__ = [
     "fill",
     "instantiate",
     "is_guest",
+    "is_kept",
     "is_left_out",
     "layout",
     "moved",
@@ -64,6 +65,7 @@ from llvmlite import ir  # noqa: E402
 from numba.core import caching, types  # noqa: E402
 from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
+from numba.core.registry import CPUDispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
 from numba.extending import intrinsic, overload  # noqa: E402
 
@@ -102,8 +104,37 @@ def compiled_to_wait(function: F) -> F:
 def _compiled(function: F, **options: Any) -> F:
     # The cache names its files by file and qualified name; two instances of one template need two names.
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
-    settings = {"cache": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    return numba.njit(**settings)(function)  # type: ignore[no-any-return]
+    if numba.config.DISABLE_JIT:
+        return function
+    settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
+    made = _Dispatcher(function, targetoptions=settings)
+    made.enable_caching()
+    return made  # type: ignore[no-any-return]
+
+
+class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function that other compiled functions call without what it needs to be called from Python.
+
+    numba adds to every function two more that unpack Python's objects. For a tuple of many arrays they are longer than
+    the function itself: half of all that was compiled, for functions that Python hardly ever calls.
+    """
+
+    def __init__(self, function: Any, targetoptions: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=targetoptions)
+        within = FunctionType(
+            function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+        )
+        within.__qualname__ = f"{function.__qualname__}-within"  # names its files in the cache
+        within.__module__ = function.__module__
+        self._within = CPUDispatcher(
+            within, targetoptions=targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        )
+        self._within.enable_caching()
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What compiled functions see where they name this one."""
+        return self._within._numba_type_
 
 
 _OURS = __name__.split(".")[0] + "."
@@ -188,6 +219,11 @@ CacheImpl._locator_classes = [_Locator]
 caching.IndexDataCacheFile = _CacheFile
 
 
+def is_kept(function: Any) -> bool:
+    """Whether ``function`` need not be compiled: it is in the cache, for some types, or is plain Python."""
+    return not isinstance(function, Dispatcher) or Path(function._cache._cache_file._index_path).exists()
+
+
 def external(name: str, result: str, *arguments: str) -> Any:
     """The function ``name`` of the C library, for compiled code; types are numba's names, such as "int32".
 
@@ -236,35 +272,13 @@ def refusal(function: Any, *arguments: Any) -> str:
         try:
             function.compile(tuple(numba.typeof(argument) for argument in arguments))
         except Exception as error:  # numba raises more than its own errors
-            return _reason(str(error)) or repr(error)
+            return reason_of(str(error)) or repr(error)
     return ""
 
 
 def is_left_out(function: Any) -> bool:
     """Whether ``function`` is plain Python where others are compiled, so that these cannot call it."""
     return not numba.config.DISABLE_JIT and not isinstance(function, Dispatcher)
-
-
-_MAKES_ARRAY = re.compile(
-    r"\w*(zeros|ones|empty|full|array|arange|linspace|eye|identity|stack|concatenate|copy|diag|outer|dot|where)\w*\("
-)
-"""A call in numba's words that makes an array."""
-_PLACE = re.compile(r'File "([^"]+)", line (\d+)')
-
-
-def _reason(text: str) -> str:
-    """What numba's message says: the first place outside numba that it names, and the innermost problem there."""
-    lines = [line.strip() for line in text.splitlines()]
-    first, *more = [line for line in lines if line and not line.startswith(("Failed in", "During:", "File "))] or [""]
-    call = next((line.removeprefix(">>>").strip() for line in more[:2] if line.startswith(">>>")), "")
-    call = re.sub(r"Literal\[\w+\]\((.*?)\)", r"\1", call)
-    place = next((found for line in lines if "/numba/" not in line and (found := _PLACE.match(line))), None)
-    where = f"{place[1]}:{place[2]}: " if place else ""
-    if _MAKES_ARRAY.match(call) or "array(" in call:
-        return f"{where}{call} makes an array, which compiled code may not: use floats, tuples, or an array in State"
-    if name := re.match(r"Untyped global name '(\w+)'.*<class 'function'>", first):
-        return f"{where}{name[1]} is not @compiled, so compiled code cannot call it"
-    return where + "; ".join(filter(None, (first.rstrip(":"), call)))
 
 
 def uncompile(modules: Sequence[ModuleType]) -> None:

@@ -34,7 +34,7 @@ from ftcc.sim.obstacles import watch
 from ftcc.sim.plant import DIVERGED, TRUTH, X, Z
 from ftcc.sim.spec import VehicleSpec
 
-__all__ = ["Kept", "Recording", "World", "fly_ticks", "new_recording", "new_world"]
+__all__ = ["Kept", "Recording", "World", "fly_by_wire", "fly_ideally", "new_recording", "new_world"]
 
 if "stages" not in globals() or "cycle" not in globals():
     raise ImportError(
@@ -205,25 +205,35 @@ def new_world(
 
 
 @compiled
-def fly_ticks(world, timing, wire, first, last):
-    """Fly the ticks first..last-1.
+def fly_by_wire(world, timing, first, last):
+    """Fly the ticks first..last-1 as between processes.
 
-    With ``wire``, as between processes: messages carry states and commands as float32, records have the mesh's latency,
-    and a command acts one sample after its measurement. Without ``wire`` the exchange is ideal.
+    Messages carry states and commands as float32, records have the mesh's latency, and a command acts one sample after
+    its measurement.
     """
     for n in range(first, last):
         set_links(world.events, world.inbox, n * timing.period_us)
-        if wire:
-            _tick_by_wire(world, timing, n)
-        else:
-            _ideal_tick(world, timing, n)
+        _tick_by_wire(world, timing, n)
+        _record(world, timing, n)
+        _advance_vehicles(world, timing, n)
+
+
+@compiled
+def fly_ideally(world, timing, first, last):
+    """Fly the ticks first..last-1 with ideal exchange.
+
+    Not one function with `fly_by_wire`: a flight needs one of them, and either takes seconds to compile.
+    """
+    for n in range(first, last):
+        set_links(world.events, world.inbox, n * timing.period_us)
+        _ideal_tick(world, timing, n)
         _record(world, timing, n)
         _advance_vehicles(world, timing, n)
 
 
 @compiled_within
 def _tick_by_wire(world, timing, n):
-    """Fly one tick as between processes."""
+    """All sense the last command's effect, then each hears, steps and shares."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
     for i in range(lost.shape[0]):
         if lost[i] == 0:
@@ -245,7 +255,7 @@ def _tick_by_wire(world, timing, n):
 
 @compiled_within
 def _ideal_tick(world, timing, n):
-    """Fly one tick with ideal exchange: all sense, then all share, then all step; a command acts at once."""
+    """All sense, then all share, then all step; a command acts at once."""
     autopilots, inbox, lost, now = world.autopilots, world.inbox, world.recording.lost, n * timing.period_us
     for i in range(lost.shape[0]):
         if lost[i] > 0:

@@ -109,8 +109,9 @@ def fly_in_parts(
     kept = list(places_kept(mission, columns).values())
     world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
     flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording, world.fleet.model)
-    loop.fly_ticks(world, timing, mission.wire, 0, 0)
-    fly_ticks = entry_of(loop.fly_ticks, world, timing, mission.wire, 0, 0)
+    fly_ticks = loop.fly_by_wire if mission.wire else loop.fly_ideally
+    fly_ticks(world, timing, 0, 0)
+    fly_ticks = entry_of(fly_ticks, world, timing, 0, 0)
     if ready is not None:
         ready()
     end = timing.ticks + 1
@@ -130,7 +131,7 @@ def fly_in_parts(
                     world.recording.begin(-(-taken // timing.record_every), -(-taken // timing.report_every))
             # A law that has just been written fails at the first tick, if ever: then that is all there is to say of it.
             until = min(end, flown + chunk, taken + room) if flown else 1
-            fly_ticks(world, timing, mission.wire, flown, until)
+            fly_ticks(world, timing, flown, until)
             if not flown and loop.stages.REFUSAL:
                 warnings.warn(loop.stages.REFUSAL, PlainPython, stacklevel=3)
             events += _drain_all_events(mission, world.fleet, world.autopilots)

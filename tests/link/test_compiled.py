@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import types
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -150,6 +151,41 @@ def test_a_cache_that_another_process_holds_for_ever_costs_the_kept_code_alone(t
     with pytest.warns(RuntimeWarning, match=r"compiled code cannot be kept.*: process 7 has held it"):
         file.save(("key", 1), "code")
     assert file.load(("key", 1)) is None
+
+
+@compiled
+def shifted(values, by):
+    return values[0] + by
+
+
+@compiled
+def shifted_twice(values, by):
+    return shifted(values, by) + shifted(values, by)
+
+
+def test_only_what_python_calls_gets_what_unpacks_its_objects():
+    values = np.array([1.0])
+    assert shifted_twice(values, 2.0) == 6.0
+    if isinstance(shifted, types.FunctionType):
+        pytest.skip("plain Python has no such functions")
+    assert shifted.signatures == []
+    assert shifted(values, 2.0) == 3.0  # a call from Python compiles it for Python
+    for function, unpacks in ((shifted._within, False), (shifted, True)):
+        (made,) = function.overloads.values()
+        unpacking = made.library.get_pointer_to_function(made.fndesc.llvm_cpython_wrapper_name)
+        assert bool(unpacking) is unpacks
+
+
+def test_what_need_not_be_compiled_is_known_before_it_is_called(tmp_path):
+    """As of the vehicles' flight, which the launcher compiles beside the autopilots' where it has to."""
+    asked = (
+        "import numpy as np\n"
+        "from ftcc.link.compiled import copy, is_kept\n"
+        "print(is_kept(copy), is_kept(len))\n"
+        "copy(np.zeros(1), np.zeros(1))\n"
+    )
+    environment = {"FTCC_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+    assert [run(["-c", asked], **environment) for _ in range(2)] == ["False True", "True True"]
 
 
 def test_damaged_code_is_compiled_again(tmp_path):

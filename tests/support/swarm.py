@@ -200,7 +200,8 @@ class Swarm:
     def fly(self, first: int = 0, last: int | None = None) -> Swarm:
         """Fly the ticks first..last-1, by default all."""
         end = self.timing.ticks + 1 if last is None else last
-        self.loop.fly_ticks(self.world, self.timing, self.form == "flight", first, end)
+        fly = self.loop.fly_by_wire if self.form == "flight" else self.loop.fly_ideally
+        fly(self.world, self.timing, first, end)
         return self
 
     @property

@@ -68,7 +68,7 @@ def test_what_the_first_period_under_trim_adds_to_the_first_error():
     mission = mission_of("flight+A", "fire_monitoring", duration=5.0)
     loop = loop_of(mission.scheme.name, mission.plant)
     world = loop.new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
-    loop.fly_ticks(world, mission.timing, mission.wire, 0, 1)
+    loop.fly_by_wire(world, mission.timing, 0, 1)
     first = world.autopilots.command.tolist()
     begun = tuple(replace(spec, command=tuple(one)) for spec, one in zip(mission.vehicles, first, strict=True))
     flights = [fly_in_memory(mission), fly_in_memory(replace(mission, vehicles=begun))]
