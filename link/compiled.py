@@ -109,7 +109,7 @@ def _compiled(function: F, **options: Any) -> F:
     settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
     made = _Dispatcher(function, targetoptions=settings)
     made.enable_caching()
-    return made  # type: ignore[no-any-return]
+    return made
 
 
 class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
@@ -221,7 +221,10 @@ caching.IndexDataCacheFile = _CacheFile
 
 def is_kept(function: Any) -> bool:
     """Whether ``function`` need not be compiled: it is in the cache, for some types, or is plain Python."""
-    return not isinstance(function, Dispatcher) or Path(function._cache._cache_file._index_path).exists()
+    if not isinstance(function, Dispatcher):
+        return True
+    kept: Any = function._cache  # type: ignore[attr-defined]
+    return Path(kept._cache_file._index_path).exists()
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

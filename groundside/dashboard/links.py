@@ -136,17 +136,25 @@ class Links:
         return np.flatnonzero(full[self._ends].all(axis=1) | (states != _FRESH))
 
     def _draw_notes(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
-        """Return notes at stale, cut and lossy edges; in a big swarm one per receiver, and at most `_NOTES`."""
+        """Return notes at stale, cut and lossy edges; in a big swarm one per receiver, and at most `_NOTES`.
+
+        A distrusted sender has one at its first such edge: all who hear a liar distrust it.
+        """
         loss = self._loss(links)
         notes: dict[int, str] = {}
         receivers: set[int] = set()
+        liars: set[int] = set()
         wrong = np.flatnonzero((self._states != _FRESH) | (loss > _LOSSY))
         if self._detail.crowded:
             wrong = wrong[np.argsort(-self._states[wrong], kind="stable")]
         for edge in wrong.tolist():
-            receiver = self._edges[edge][1]
+            sender, receiver = self._edges[edge]
             if _receiver_silent(receiver, snapshot) or (self._detail.crowded and receiver in receivers):
                 continue
+            if self._states[edge] == _DOUBTED:
+                if sender in liars:
+                    continue
+                liars.add(sender)
             notes[edge] = _note(links[edge], int(self._states[edge]), float(loss[edge]))
             receivers.add(receiver)
             if self._detail.crowded and len(notes) >= _NOTES:

@@ -101,8 +101,7 @@ class ControlPlane:
         self._arrived: collections.deque[tuple[str, Any]] = collections.deque()
         self._bell = Bell()
         self._declared: list[Any] = [close_at_once(self._session)]
-        self.refused = 0
-        """What came and was no message."""
+        self._foreign, self._next_foreign = 0, 1
 
     def fileno(self) -> int:
         """Return a descriptor that is readable where something has come."""
@@ -117,8 +116,16 @@ class ControlPlane:
         return came
 
     def refusals(self) -> list[str]:
-        """Return what there is to tell of who was refused; to be called often, mostly nothing."""
-        return [] if self._texts is None else self._texts.due()
+        """Return what there is to tell of who and what was refused; to be called often, mostly nothing."""
+        texts = [] if self._texts is None else self._texts.due()
+        if self._foreign >= self._next_foreign:
+            texts.append(f"{self._foreign} messages between computers were none of ours, and dropped")
+            self._next_foreign = 10 * self._foreign
+        return texts
+
+    def drop(self) -> None:
+        """Count something that came and belongs nowhere; from any thread."""
+        self._foreign += 1
 
     def ignore_others(self, port: int, addresses: Iterable[str]) -> None:
         """From here on ignore callers at this end's port from other addresses, where links are encrypted."""
@@ -146,13 +153,18 @@ class ControlPlane:
             try:
                 self.keep(sender, decode(bytes(sample.payload)))
             except MessageError:
-                self.refused += 1
+                self.drop()
 
         self._declared.append(self._session.declare_subscriber(key, keep))
 
-    def listen_for_bytes(self, key: str, take: Callable[[bytes], None]) -> None:
-        """Give ``take`` the bytes that come under a key, in Zenoh's thread."""
-        self._declared.append(self._session.declare_subscriber(key, lambda sample: take(bytes(sample.payload))))
+    def listen_for_bytes(self, key: str, take: Callable[[bytes], bool]) -> None:
+        """Give ``take`` the bytes that come under a key, in Zenoh's thread; it returns whether they belong anywhere."""
+
+        def keep(sample: Any) -> None:
+            if not take(bytes(sample.payload)):
+                self.drop()
+
+        self._declared.append(self._session.declare_subscriber(key, keep))
 
     def live(self, key: str) -> None:
         """Declare a token, which is gone when this end is."""
@@ -174,7 +186,7 @@ class ControlPlane:
             try:
                 reply = join(decode(bytes(query.payload)))
             except MessageError:
-                self.refused += 1
+                self.drop()
                 return
             query.reply(_JOIN, encode(reply))
 

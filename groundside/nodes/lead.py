@@ -341,25 +341,26 @@ class Nodes:
     def _token_watcher(self, name: str) -> Callable[[bool], None]:
         return lambda there: self._control.keep(name, there)
 
-    def _file_taker(self, node: KnownNode) -> Callable[[bytes], None]:
-        def take(data: bytes) -> None:
+    def _file_taker(self, node: KnownNode) -> Callable[[bytes], bool]:
+        def take(data: bytes) -> bool:
             try:
                 if node.receiver is not None:
                     node.receiver.take(data)
             except OSError as error:
                 self._control.keep(node.name, FileError(str(error)))
+            return node.receiver is not None
 
         return take
 
-    def _datagram_taker(self, node: KnownNode) -> Callable[[bytes], None]:
-        def take(data: bytes) -> None:
+    def _datagram_taker(self, node: KnownNode) -> Callable[[bytes], bool]:
+        def take(data: bytes) -> bool:
             route = route_of(data)
             ends = self.place(route[1]) if route and route[0] == PAIR else ("", "")
             if node.name in ends and all(ends):
                 other = ends[1] if ends[0] == node.name else ends[0]
                 self._control.send_bytes(for_node(other, "datagram"), data, droppable=True)
-            elif node.relay is not None:
-                node.relay.deliver(data)
+                return True
+            return node.relay is not None and node.relay.deliver(data)
 
         return take
 

@@ -365,6 +365,8 @@ class _Node:
                 child.ended = message
             child.dead = child.dead or isinstance(message, Exited)
             self.send(FromChild(child.name, message))
+        for text in self.control.refusals():
+            self.say(text)
         for _, what in self.control.take():
             match what:
                 case ForChild(name, Kill()) if name in self.by_name:

@@ -55,8 +55,6 @@ class Relay:
         self._lock = threading.Lock()
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="relay", daemon=True)
-        self.dropped = 0
-        """Datagrams from the other end that belong nowhere."""
 
     def start(self) -> None:
         """Begin to carry datagrams; from here on sockets may only be added by `deliver`."""
@@ -77,16 +75,15 @@ class Relay:
         """Send datagrams on to an address; ``bound`` gives the port from which, by whose datagram it is."""
         self._exits[channel, number] = _Exit(to, bound)
 
-    def deliver(self, data: bytes) -> None:
-        """Send a datagram from the other end on; from any thread."""
+    def deliver(self, data: bytes) -> bool:
+        """Send a datagram from the other end on, from any thread; False if it belongs nowhere."""
         if len(data) < _HEADER.size:
-            self.dropped += 1
-            return
+            return False
         channel, number, flow = _HEADER.unpack_from(data)
         datagram = data[_HEADER.size :]
         with self._lock:
             if self._ending:
-                return
+                return True
             entrance, way_out = self._entrances.get((channel, number)), self._exits.get((channel, number))
             if entrance is not None:
                 entrance.answer(flow, datagram)
@@ -97,8 +94,7 @@ class Relay:
                 # Nobody listens there, or the buffer is full: a datagram may be lost.
                 with contextlib.suppress(OSError):
                     link.send(datagram)
-            else:
-                self.dropped += 1
+            return entrance is not None or way_out is not None
 
     def _run(self) -> None:
         while not self._ending:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 from pathlib import Path
 
@@ -83,6 +84,27 @@ def test_an_edge_whose_sender_is_distrusted_has_a_colour_and_a_note_of_its_own(t
     assert tuple(int(rgba >> shift & 0xFF) for shift in (24, 16, 8)) == DOUBTED
     assert "trust 0.2" in at(tmp_path / "swarm.rrd", "/graph/notes", "Points2D:labels", 5.0)
     assert f"distrusts {sender}" in at(tmp_path / "swarm.rrd", "/swarm", "TextDocument:text", 5.0)[0]
+
+
+def test_a_sender_whom_everybody_distrusts_has_one_note(tmp_path: Path) -> None:
+    snap = snapshot(5.0)
+    heard = collections.Counter(sender for sender, _ in EDGES)
+    liar, times = heard.most_common(1)[0]
+    assert times > 1
+    uavs = {
+        uav: dataclasses.replace(
+            state,
+            links={
+                sender: dataclasses.replace(link, trust=0.1) if sender == liar else link
+                for sender, link in state.links.items()
+            },
+        )
+        for uav, state in snap.uavs.items()
+    }
+    dashboard = make(tmp_path / "swarm.rrd")
+    dashboard.log(Snapshot(5.0, uavs))
+    dashboard.close()
+    assert at(tmp_path / "swarm.rrd", "/graph/notes", "Points2D:labels", 5.0).count("trust 0.1") == 1
 
 
 def test_a_formation_that_spreads_is_not_put_into_lanes(tmp_path: Path) -> None:
