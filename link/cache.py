@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 
 from ftcc.link.folders import cache_folder
 
-__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "guest_folder", "kept", "not_kept"]
+__all__ = ["SCHEME_ENTRY_POINTS", "CacheBusyError", "alone", "folder", "guest_folder", "in_turn", "kept", "not_kept"]
 
 SCHEME_ENTRY_POINTS = "ftcc.schemes"
 """Entry-point group under which other packages offer schemes."""
@@ -42,6 +42,8 @@ _LIBRARIES = ("numba", "numpy", "pymavlink", "scipy")
 """On which the contents depend beside the sources: pymavlink gives the layouts of messages."""
 _POLL, _SILENT, _TIMEOUT = 0.02, 3.0, 30.0
 """A process that waits for another one to write polls, reports that it waits, and gives up after so long, s."""
+_LONGEST_TURN = 300.0
+"""Longest wait for another process that makes the same, s."""
 
 _warned: set[str] = set()
 """Warnings that this process has given."""
@@ -66,20 +68,13 @@ def alone(place: Path) -> Iterator[None]:
     """
     place.mkdir(parents=True, exist_ok=True)
     with (place / ".writing").open("a+", encoding="ascii") as file:
-        began = time.monotonic()
         reported = False
-        while True:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                waited = time.monotonic() - began
+        for waited in _waiting(file):
             if waited > _TIMEOUT:
                 raise CacheBusyError(f"process {_holder(file)} has held {file.name} for {waited:.0f} s")
             if waited > _SILENT and not reported:
                 print(f"ftcc: waiting for process {_holder(file)}, which writes into {place}", file=sys.stderr)
                 reported = True
-            time.sleep(_POLL)
         file.truncate(0)
         file.write(str(os.getpid()))
         file.flush()
@@ -88,6 +83,35 @@ def alone(place: Path) -> Iterator[None]:
         finally:
             # Explicitly, not by close(): a process forked meanwhile has the file open, too.
             fcntl.flock(file, fcntl.LOCK_UN)
+
+
+@contextmanager
+def in_turn(name: Path) -> Iterator[None]:
+    """Do what is named so while no other process does: the second one finds in the cache what the first has made.
+
+    It goes ahead where the other takes minutes, as one that is stopped, or where no file can be made.
+    """
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):
+            name.parent.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context(name.open("a+", encoding="ascii"))
+            stack.callback(fcntl.flock, file, fcntl.LOCK_UN)
+            for waited in _waiting(file):
+                if waited > _LONGEST_TURN:
+                    break
+        yield
+
+
+def _waiting(file: Any) -> Iterator[float]:
+    """Wait until this process alone has a file; yields, in the meantime, for how long it has waited, s."""
+    began = time.monotonic()
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            yield time.monotonic() - began
+        time.sleep(_POLL)
 
 
 def _holder(file: Any) -> str:

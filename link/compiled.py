@@ -64,6 +64,7 @@ import numba  # noqa: E402  (must see NUMBA_CACHE_DIR)
 from llvmlite import ir  # noqa: E402
 from numba.core import caching, types  # noqa: E402
 from numba.core.caching import CacheImpl, IndexDataCacheFile, UserProvidedCacheLocator  # noqa: E402
+from numba.core.compiler_lock import global_compiler_lock  # noqa: E402
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from numba.core.registry import CPUDispatcher  # noqa: E402
 from numba.core.types.containers import BaseTuple, NamedUniTuple, UniTuple  # noqa: E402
@@ -107,12 +108,24 @@ def _compiled(function: F, **options: Any) -> F:
     if numba.config.DISABLE_JIT:
         return function
     settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    made = _Dispatcher(function, targetoptions=settings)
+    made = _Called(function, targetoptions=settings)
     made.enable_caching()
     return made
 
 
 class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function; of several processes that need it at the same time one compiles it, and the others wait."""
+
+    def compile(self, sig: Any) -> Any:
+        if is_kept(self):
+            return super().compile(sig)
+        # Functions compile those that they call: processes take their turns in the order of calls, so none waits for
+        # one that waits for it. Threads would, without numba's own lock around.
+        with global_compiler_lock, cache.in_turn(_index_of(self).with_suffix(".turn")):
+            return super().compile(sig)
+
+
+class _Called(_Dispatcher):
     """A compiled function that other compiled functions call without what it needs to be called from Python.
 
     numba adds to every function two more that unpack Python's objects. For a tuple of many arrays they are longer than
@@ -126,7 +139,7 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
         )
         within.__qualname__ = f"{function.__qualname__}-within"  # names its files in the cache
         within.__module__ = function.__module__
-        self._within = CPUDispatcher(
+        self._within = _Dispatcher(
             within, targetoptions=targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         )
         self._within.enable_caching()
@@ -221,10 +234,12 @@ caching.IndexDataCacheFile = _CacheFile
 
 def is_kept(function: Any) -> bool:
     """Whether ``function`` need not be compiled: it is in the cache, for some types, or is plain Python."""
-    if not isinstance(function, Dispatcher):
-        return True
-    kept: Any = function._cache  # type: ignore[attr-defined]
-    return Path(kept._cache_file._index_path).exists()
+    return not isinstance(function, Dispatcher) or _index_of(function).exists()
+
+
+def _index_of(function: Any) -> Path:
+    """The file of the cache that lists for which types there is code of a function."""
+    return Path(function._cache._cache_file._index_path)
 
 
 def external(name: str, result: str, *arguments: str) -> Any:

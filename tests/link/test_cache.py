@@ -141,6 +141,18 @@ def test_what_is_done_alone_may_fail_and_lets_go(tmp_path):
         assert (tmp_path / ".writing").read_text() == str(os.getpid())
 
 
+@pytest.mark.parametrize("stopped", [True, False], ids=["stopped", "no folder"])
+def test_nobody_waits_for_ever_for_a_turn(tmp_path, monkeypatch, stopped):
+    """Where another process is stopped, or no file can be made, the same is made twice."""
+    monkeypatch.setattr(cache, "_LONGEST_TURN", 0.1)
+    place = tmp_path / "function.turn" if stopped else tmp_path / "file" / "function.turn"
+    (tmp_path / "file").write_text("not a folder")
+    done = []
+    with cache.in_turn(place), cache.in_turn(place):
+        done.append("both")
+    assert done == ["both"]
+
+
 def test_a_result_that_cannot_be_kept_is_given_all_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "_warned", set())
     (tmp_path / "kept").write_text("a file where a folder should be: nothing can be written below it")

@@ -132,6 +132,31 @@ def test_processes_that_compile_one_function_for_other_types_at_once_each_find_t
             assert file.load((str(who), n)) == f"code of {who}, {n}"
 
 
+def test_of_processes_that_need_the_same_function_at_once_one_compiles_it(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import sys\n"
+        "import numpy as np\n"
+        "from ftcc.link.compiled import compiled, copy\n"
+        "@compiled\ndef both(values):\n    copy(values, values)\n    copy(values, values[1:])\n"
+        "print('ready', flush=True)\n"
+        "sys.stdin.readline()\n"
+        "both(np.zeros(3))\n"
+        "print(*(sum(one.stats.cache_misses.values()) for one in (both, copy._within)))\n"
+    )
+    environment = {**os.environ, "FTCC_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    command = [sys.executable, str(tmp_path / "own.py")]
+    others = [
+        subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    assert [other.stdout.readline() for other in others] == ["ready\n"] * 3
+    for other in others:
+        other.stdin.write("go\n")
+        other.stdin.flush()
+    compiled_here = [other.communicate(timeout=120.0)[0].split() for other in others]
+    assert sorted(compiled_here) == [["0", "0"], ["0", "0"], ["1", "1"]]
+
+
 def test_what_somebody_compiles_with_numba_itself_is_kept_there_too(tmp_path):
     (tmp_path / "own.py").write_text(
         "import ftcc.link.compiled\nimport numba\n"
