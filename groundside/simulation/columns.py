@@ -16,7 +16,7 @@ from ftcc.sim.plants import conditions_of, find
 __all__ = ["PARTS", "NotRecordedError", "Place", "columns_needed", "places_kept", "places_of"]
 
 PARTS = ("truth", "command", "acting", "conditions", "signals")
-"""Parts of a recording that have columns, see ``flight_loop.Recording``."""
+"""Parts of a recording that have columns, see ``flight_arrays.Recording``."""
 
 _CLEARANCE = "clearance"
 """A column that is computed from these:"""

@@ -28,6 +28,7 @@ from ftcc.groundside.errors import UserError
 from ftcc.groundside.scenario import Mission
 from ftcc.groundside.simulation.columns import places_kept
 from ftcc.groundside.simulation.flight import Flight
+from ftcc.groundside.simulation.flight_arrays import new_world
 from ftcc.groundside.simulation.space import recording_size, require_space
 from ftcc.link.compiled import entry_of, instantiate, uncompile
 from ftcc.link.events import drain_events
@@ -107,7 +108,7 @@ def fly_in_parts(
     timing = mission.timing
     loop = loop_of(mission.scheme.name, mission.plant, is_active(mission.autopilots))
     kept = list(places_kept(mission, columns).values())
-    world = loop.new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
+    world = new_world(mission.vehicles, mission.autopilots, timing, len(conditions_of(mission.plant)), room, kept)
     flight_so_far = functools.partial(_flight_so_far, mission, columns, world.recording, world.fleet.model)
     fly_ticks = loop.fly_by_wire if mission.wire else loop.fly_ideally
     fly_ticks(world, timing, 0, 0)

@@ -19,6 +19,7 @@ from ftcc.groundside import load
 from ftcc.groundside.claims import evaluate
 from ftcc.groundside.scenario import Mission, resolve
 from ftcc.groundside.simulation import fly_in_memory
+from ftcc.groundside.simulation.flight_arrays import new_world
 from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.link.system_calls import monotonic
 from ftcc.sim.plants import conditions_of
@@ -89,8 +90,7 @@ def _flyer(scheme: str, plant: str) -> Any:
 
 
 def _new_world(mission: Mission) -> Any:
-    loop = loop_of(mission.scheme.name, mission.plant)
-    return loop.new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
+    return new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
 
 
 def stage_seconds(mission: Mission) -> tuple[dict[str, float], Any]:

@@ -21,6 +21,7 @@ from ftcc.airside.references.profiles import Command, Cosine, Profile
 from ftcc.airside.scheme import Scheme
 from ftcc.airside.schemes import find
 from ftcc.airside.spec import AutopilotSpec, LinkEvent, Neighbour, OwnReference
+from ftcc.groundside.simulation.flight_arrays import new_world
 from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.link.actuators import ACTUATORS
 from ftcc.link.channel import Channel, Inbox
@@ -184,7 +185,7 @@ class Swarm:
             autopilot(uav, gains=gains, channel=self.channel, link_events=self.link_events.get(uav, ()))
             for uav in GRAPH.uavs
         ]
-        self.world = self.loop.new_world(vehicles, specs, self.timing, len(conditions_of("longitudinal")))
+        self.world = new_world(vehicles, specs, self.timing, len(conditions_of("longitudinal")))
         self.fleet, self.autopilots, self.inbox = self.world.fleet, self.world.autopilots, self.world.inbox
         self.events, self.exchange, self.recording = self.world.events, self.world.exchange, self.world.recording
 

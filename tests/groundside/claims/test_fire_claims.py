@@ -11,6 +11,7 @@ import pytest
 from ftcc.groundside.scenario.loading import Scenario, ScenarioError, load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import fly_in_memory
+from ftcc.groundside.simulation.flight_arrays import new_world
 from ftcc.groundside.simulation.one_process import loop_of
 from ftcc.sim.plants import conditions_of
 from tests.groundside.conftest import failing, mission_of
@@ -67,7 +68,7 @@ def test_what_the_first_period_under_trim_adds_to_the_first_error():
     """0.055 m instead of 0.066 with the first command in force from t = 0 on, as reference section 5.4 has it."""
     mission = mission_of("flight+A", "fire_monitoring", duration=5.0)
     loop = loop_of(mission.scheme.name, mission.plant)
-    world = loop.new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
+    world = new_world(mission.vehicles, mission.autopilots, mission.timing, len(conditions_of(mission.plant)))
     loop.fly_by_wire(world, mission.timing, 0, 1)
     first = world.autopilots.command.tolist()
     begun = tuple(replace(spec, command=tuple(one)) for spec, one in zip(mission.vehicles, first, strict=True))

@@ -9,6 +9,7 @@ from ftcc.airside.compiled_stages import stages_of
 from ftcc.groundside.scenario.loading import load
 from ftcc.groundside.scenario.mission import resolve
 from ftcc.groundside.simulation import Flight, fly_in_memory
+from ftcc.groundside.simulation.flight_arrays import new_world
 from ftcc.groundside.simulation.one_process import loop_of
 
 
@@ -36,7 +37,7 @@ def test_everybody_but_the_link_counts_from_the_origin() -> None:
     """What the autopilot makes of its vehicle's messages is what it tells the ground."""
     mission = resolve(load("containment", settings=["home.datum=1000.0"]))
     loop = loop_of("containment", "longitudinal")
-    world = loop.new_world(mission.vehicles, mission.autopilots, mission.timing, 40)
+    world = new_world(mission.vehicles, mission.autopilots, mission.timing, 40)
     loop.cycle.sense(world.fleet, 0, 0, 0, 1, world.true[0], world.measured, world.state, world.controls)
     altitude = mission.vehicles[0].initial[2]
     assert world.state[9] == np.float32(-(altitude - 1000.0))
