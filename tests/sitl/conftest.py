@@ -43,7 +43,7 @@ class Flight:
     def output(self) -> str:
         return self._output.read_text()
 
-    def wait(self, seconds: float = 120.0) -> int:
+    def wait(self, seconds: float = 240.0) -> int:
         """Exit code."""
         return self.process.wait(seconds)
 
@@ -66,7 +66,7 @@ class Flight:
                 continue
         raise AssertionError(f"no process writes {log}; output so far:\n{self.output}")
 
-    def wait_until(self, condition: Callable[[], bool], seconds: float = 120.0) -> None:
+    def wait_until(self, condition: Callable[[], bool], seconds: float = 240.0) -> None:
         """Wait for a condition while the flight goes on."""
         until = time.monotonic() + seconds
         while not condition():
