@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -45,6 +48,29 @@ def test_ctrl_c_while_processes_start_ends_the_launcher_and_those_that_run(
     assert ended.returncode != 0, ended.stdout + ended.stderr
     (process,) = [int(line.split()[1]) for line in ended.stdout.splitlines() if line.startswith("process ")]
     assert not psutil.pid_exists(process)
+
+
+def test_ctrl_c_while_the_first_start_compiles_ends_it_without_a_word(
+    fly: Callable[..., Flight], environment: dict[str, str], tmp_path: Path
+) -> None:
+    """In a terminal all its processes get it; two compile, side by side."""
+    environment["FTCC_CACHE_DIR"] = str(tmp_path / "empty cache")
+
+    def compiling() -> list[psutil.Process]:
+        found = []
+        for one in flight.processes():
+            with contextlib.suppress(psutil.NoSuchProcess):
+                found += [one] * ("forkserver" in " ".join(one.cmdline()))
+        return found
+
+    flight = fly("demo", "--mavlink", "none")
+    flight.wait_until(lambda: len(compiling()) == 2)
+    processes = compiling()
+    os.killpg(flight.process.pid, signal.SIGINT)
+    assert flight.wait(60.0) == 130
+    assert "Traceback" not in flight.output
+    _, alive = psutil.wait_procs(processes, timeout=20.0)
+    assert not alive
 
 
 def test_a_flight_whose_processes_died_before_it_has_not_flown(fly: Callable[..., Flight]) -> None:
