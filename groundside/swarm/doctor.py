@@ -100,7 +100,7 @@ def examine(
 
 def describe_machine(mission: Mission) -> list[Finding]:
     """Return interpreter, cores, memory, ports, compiled code, and programs that only some tests need."""
-    from ftcc.link.compiled import cache_folder
+    from ftcc.link.numba_cache import cache_folder
 
     cores = usable_cores()
     memory = psutil.virtual_memory()

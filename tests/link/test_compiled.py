@@ -18,7 +18,6 @@ from ftcc.link import cache
 from ftcc.link.compiled import (
     Room,
     Vector,
-    _CacheFile,
     compiled,
     copy,
     fields,
@@ -28,6 +27,7 @@ from ftcc.link.compiled import (
     store,
     width,
 )
+from ftcc.link.numba_cache import CacheFile
 from tests.support.swarm import AIRFRAME
 
 REPOSITORY = Path(__file__).parents[2]
@@ -68,7 +68,7 @@ class Package:
     def start(self) -> tuple[float, int, str]:
         """Value of the law, how often it had to be compiled, the cache folder in use."""
         program = (
-            "from ftcc.airside import caller; from ftcc.link.compiled import cache_folder\n"
+            "from ftcc.airside import caller; from ftcc.link.numba_cache import cache_folder\n"
             f"assert caller.__file__.startswith({str(self.root)!r}), caller.__file__\n"
             "value = caller.law(10.0, 2.0, 0.25)\n"
             "print(value, sum(caller.law.stats.cache_misses.values()), cache_folder)"
@@ -106,8 +106,8 @@ def test_processes_that_compile_one_function_for_other_types_at_once_each_find_t
     """In numba's own way one overwrites what another has just written, or leaves an index that names it."""
     program = (
         "import sys\n"
-        "from ftcc.link.compiled import _CacheFile\n"
-        f"file = _CacheFile({str(tmp_path)!r}, 'law-1.py', (0.0, 0))\n"
+        "from ftcc.link.numba_cache import CacheFile\n"
+        f"file = CacheFile({str(tmp_path)!r}, 'law-1.py', (0.0, 0))\n"
         "print('ready', flush=True)\n"
         "sys.stdin.readline()\n"
         "for n in range(30):\n"
@@ -126,7 +126,7 @@ def test_processes_that_compile_one_function_for_other_types_at_once_each_find_t
         other.stdin.write("go\n")
         other.stdin.flush()
     assert [other.wait(60.0) for other in others] == [0, 0, 0]
-    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    file = CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
     for who in range(3):
         for n in range(30):
             assert file.load((str(who), n)) == f"code of {who}, {n}"
@@ -172,7 +172,7 @@ def test_a_cache_that_another_process_holds_for_ever_costs_the_kept_code_alone(t
         raise cache.CacheBusyError("process 7 has held it")
 
     monkeypatch.setattr(cache, "alone", never)
-    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    file = CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
     with pytest.warns(RuntimeWarning, match=r"compiled code cannot be kept.*: process 7 has held it"):
         file.save(("key", 1), "code")
     assert file.load(("key", 1)) is None
@@ -214,7 +214,7 @@ def test_what_need_not_be_compiled_is_known_before_it_is_called(tmp_path):
 
 
 def test_damaged_code_is_compiled_again(tmp_path):
-    file = _CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
+    file = CacheFile(str(tmp_path), "law-1.py", (0.0, 0))
     file.save("key", "code")
     for path in tmp_path.glob("law-1.py.*"):
         whole = path.read_bytes()
