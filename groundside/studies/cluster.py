@@ -55,8 +55,7 @@ class Cluster(Engine):
     @property
     def workers(self) -> int:  # type: ignore[override]
         """Number of threads of all usable workers, at least 1: others may come."""
-        there = self._there()
-        return max(1, sum(int(there[one]["nthreads"]) for one in self._usable()))
+        return max(1, sum(int(one["nthreads"]) for one in self._usable().values()))
 
     def submit(self, plan: bytes, numbers: Sequence[int]) -> Future[list[Outcome]]:
         return self._executor().submit(fly_batch, plan, numbers, versions())
@@ -84,12 +83,12 @@ class Cluster(Engine):
             self._executors[usable] = self._client.get_executor(pure=False, **options)
         return self._executors[usable]
 
-    def _there(self) -> dict[str, Any]:
-        return self._client.scheduler_info(n_workers=-1)["workers"]  # type: ignore[no-any-return]
+    def _usable(self) -> dict[str, Any]:
+        """Return what Dask tells of the workers with this version of the program, by address.
 
-    def _usable(self) -> list[str]:
-        """Return the workers with this version of the program; say of each other one, once, why it is not used."""
-        there = self._there()
+        Of each other one it says, once, why it is not used.
+        """
+        there = self._client.scheduler_info(n_workers=-1)["workers"]
         new = [one for one in there if one not in self._known]
         if new:
             found = self._client.run(versions, workers=new, on_error="return")
@@ -102,7 +101,7 @@ class Cluster(Engine):
                 if wrong:
                     name = there[one].get("name", one)
                     warnings.warn(f"worker {name} at {one} is not used: {wrong}", RuntimeWarning, stacklevel=3)
-        return [one for one in there if self._known.get(one)]
+        return {one: worker for one, worker in there.items() if self._known.get(one)}
 
 
 def _local_cluster(address: str) -> Any:

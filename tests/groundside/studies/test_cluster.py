@@ -8,14 +8,16 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ftcc.groundside.studies import fly_study, open_folder, plan_study
 from ftcc.groundside.studies.campaign import Progress
+from ftcc.groundside.studies.cluster import Cluster
 from tests.groundside.studies.test_random_studies import scenario_in
 from tests.support.ports import free_port
 
@@ -114,3 +116,23 @@ def test_a_worker_with_other_sources_is_not_used_and_is_named(scheduler: str, tm
             wait_for_workers(scheduler, 2)
             with pytest.warns(RuntimeWarning, match="worker stranger"):
                 assert fly_study(plan, open_folder(plan, tmp_path / "flown"), cluster=scheduler)
+
+
+class Joining:
+    """A client of a scheduler that one more worker has joined whenever it is asked."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+        self.asked += 1
+        return {"workers": {f"tcp://127.0.0.1:{port}": {"nthreads": 2} for port in range(self.asked)}}
+
+    def run(self, function: Callable[[], Any], workers: list[str], on_error: str) -> dict[str, Any]:
+        return dict.fromkeys(workers, function())
+
+
+def test_a_worker_that_joins_while_others_are_counted_is_counted_next_time() -> None:
+    cluster = Cluster.__new__(Cluster)
+    cluster._client, cluster._known = Joining(), {}
+    assert [cluster.workers for _ in range(3)] == [2, 4, 6]
