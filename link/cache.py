@@ -86,15 +86,15 @@ def alone(place: Path) -> Iterator[None]:
 
 
 @contextmanager
-def in_turn(name: Path) -> Iterator[None]:
-    """Do what is named so while no other process does: the second one finds in the cache what the first has made.
+def in_turn(place: Path) -> Iterator[None]:
+    """Do what the file ``place`` stands for while no other process does: it finds in the cache what this one has made.
 
     It goes ahead where the other takes minutes, as one that is stopped, or where no file can be made.
     """
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):
-            name.parent.mkdir(parents=True, exist_ok=True)
-            file = stack.enter_context(name.open("a+", encoding="ascii"))
+            place.parent.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context(place.open("a+", encoding="ascii"))
             stack.callback(fcntl.flock, file, fcntl.LOCK_UN)
             for waited in _waiting(file):
                 if waited > _LONGEST_TURN:
