@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
@@ -46,6 +47,8 @@ class Links:
         graph = subject.graph
         self._uavs = sorted(graph.uavs)
         self._edges = sorted((sender, receiver) for receiver, sender in graph.weights)
+        self._receivers = Counter(sender for sender, _ in self._edges)
+        """How many receivers a sender has."""
         index = {uav: i for i, uav in enumerate(self._uavs)}
         self._ends = np.array([(index[j], index[i]) for j, i in self._edges], dtype=int).reshape(-1, 2)
         self._layout = _layout(graph, set(subject.leaders))
@@ -138,12 +141,14 @@ class Links:
     def _draw_notes(self, snapshot: Snapshot, links: list[LinkState | None]) -> list[Entry]:
         """Return notes at stale, cut and lossy edges; in a big swarm one per receiver, and at most `_NOTES`.
 
-        A distrusted sender has one at its first such edge: all who hear a liar distrust it.
+        A sender whom at least half of its receivers distrust has one, at the first such edge. W-MSR leaves out
+        somebody on nearly every edge: there the colour, and the table of the swarm, must do.
         """
         loss = self._loss(links)
         notes: dict[int, str] = {}
         receivers: set[int] = set()
         liars: set[int] = set()
+        doubts = Counter(self._edges[edge][0] for edge in np.flatnonzero(self._states == _DOUBTED).tolist())
         wrong = np.flatnonzero((self._states != _FRESH) | (loss > _LOSSY))
         if self._detail.crowded:
             wrong = wrong[np.argsort(-self._states[wrong], kind="stable")]
@@ -152,7 +157,7 @@ class Links:
             if _receiver_silent(receiver, snapshot) or (self._detail.crowded and receiver in receivers):
                 continue
             if self._states[edge] == _DOUBTED:
-                if sender in liars:
+                if sender in liars or 2 * doubts[sender] < self._receivers[sender]:
                     continue
                 liars.add(sender)
             notes[edge] = _note(links[edge], int(self._states[edge]), float(loss[edge]))
