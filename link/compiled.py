@@ -97,12 +97,12 @@ def _compiled(function: F, **options: Any) -> F:
     if numba.config.DISABLE_JIT:
         return function
     settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    made = _Called(function, targetoptions=settings)
+    made = _Compiled(function, targetoptions=settings)
     made.enable_caching()
     return made
 
 
-class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
+class _InTurn(CPUDispatcher):  # type: ignore[misc]
     """A compiled function; of several processes that need it at the same time one compiles it, and the others wait."""
 
     def compile(self, sig: Any) -> Any:
@@ -114,7 +114,7 @@ class _Dispatcher(CPUDispatcher):  # type: ignore[misc]
             return super().compile(sig)
 
 
-class _Called(_Dispatcher):
+class _Compiled(_InTurn):
     """A compiled function that other compiled functions call without what it needs to be called from Python.
 
     numba adds to every function two more that unpack Python's objects. For a tuple of many arrays they are longer than
@@ -128,7 +128,7 @@ class _Called(_Dispatcher):
         )
         within.__qualname__ = f"{function.__qualname__}-within"  # names its files in the cache
         within.__module__ = function.__module__
-        self._within = _Dispatcher(
+        self._within = _InTurn(
             within, targetoptions=targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         )
         self._within.enable_caching()

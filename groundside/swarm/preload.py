@@ -17,8 +17,8 @@ from pathlib import Path
 gc.disable()
 
 # Ctrl-C while this compiles ends it without a word: the launcher has one.
-_handler = signal.getsignal(signal.SIGINT)
-if _handler is signal.default_int_handler:
+_heeds_ctrl_c = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+if _heeds_ctrl_c:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 # Arrow's allocator would start a thread, which no child would have.
@@ -95,6 +95,7 @@ def _compile_vehicles(plant: str) -> int:
 if SCHEME_VARIABLE in os.environ:
     load(os.environ[SCHEME_VARIABLE], os.environ[PLANT_VARIABLE], os.environ[ACTIVE_VARIABLE] == "1")
 
-signal.signal(signal.SIGINT, _handler)
+if _heeds_ctrl_c:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 gc.freeze()
 gc.enable()
