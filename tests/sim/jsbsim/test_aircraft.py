@@ -159,16 +159,18 @@ def test_the_step_is_never_longer_than_its_aircraft_allow() -> None:
     assert load(TRAINER, 20_000).get_delta_t() == pytest.approx(0.02 / 3.0)
 
 
-def test_nothing_is_printed_and_no_socket_opened(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_nothing_is_printed_and_no_socket_opened(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Where JSBSim loads them itself, the 737 listens on two ports and the business jet writes a table."""
-    before = {file.name for file in Path().iterdir()}
+    monkeypatch.chdir(tmp_path)
     for name in ("737", "global5000"):
         load(Aircraft(name)).run_ic()
     assert capfd.readouterr() == ("", "")
     assert not [
         one for one in psutil.Process().net_connections() if one.status == "LISTEN" and one.laddr.port in (5138, 5139)
     ]
-    assert {file.name for file in Path().iterdir()} == before
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
