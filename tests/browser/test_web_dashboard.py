@@ -107,25 +107,30 @@ def open_page(browser, address: str, theme: str) -> None:
     browser.get(f"{address}&renderer=webgl")
 
 
-def wait_until_drawn(browser) -> None:
+def is_drawn(shown: np.ndarray) -> bool:
+    return colored(shown[SCENE]) > 0.002
+
+
+def wait_until_drawn(browser) -> np.ndarray:
+    """The first picture in which the 3D view is drawn; the next may be blank, while views take their places."""
     deadline = time.monotonic() + 120.0
-    while time.monotonic() < deadline and colored(picture(browser)[SCENE]) < 0.002:
+    while not is_drawn(shown := picture(browser)):
+        assert time.monotonic() < deadline, "the 3D view is blank"
         time.sleep(1.0)
+    return shown
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_the_scene_is_drawn_and_advances_while_the_swarm_flies(dashboard, swarm, browser, theme):
     assert dashboard.address is not None
     open_page(browser, dashboard.address, theme)
-    wait_until_drawn(browser)
-    early, early_t = picture(browser), swarm.t
-    assert colored(early[SCENE]) > 0.002, "the 3D view is blank"
+    early, early_t = wait_until_drawn(browser), swarm.t
     # Drawn in software, the page lags behind the swarm by seconds.
     deadline = time.monotonic() + 60.0
     moved = 0.0
     while moved <= 0.001 and time.monotonic() < deadline:
         time.sleep(2.0)
-        late, late_t = picture(browser), swarm.t
+        late, late_t = wait_until_drawn(browser), swarm.t
         moved = float((np.abs(late[SCENE] - early[SCENE]).max(axis=2) > 40).mean())
     if folder := os.environ.get("FTCC_SCREENSHOTS"):
         browser.save_screenshot(os.path.join(folder, f"dashboard-{theme}.png"))
