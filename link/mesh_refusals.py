@@ -41,6 +41,8 @@ _SHOWN = 100
 _CACHED = 9
 """Decisions that Zenoh takes in advance, and logs like refusals, when it first meets a key."""
 
+_NAMELESS = 2.0
+"""How long a refusal waits for the name of its link, s of wall time: Zenoh tells of both in either order."""
 _PERIOD, _LONGEST_PERIOD = 2.5, 320.0
 """Wall time between two reports, at first and in a flood, s."""
 
@@ -123,12 +125,12 @@ class RefusalCounter:
         self._fresh: collections.Counter[tuple[str, str]] = collections.Counter()
         self._lock = threading.Lock()
         self._of_zid: dict[str, str] = {}
+        self._nameless: dict[tuple[str, str], tuple[int, float]] = {}
+        """By reason and Zenoh's number of the process: how often, and since when."""
         self._ahead: dict[bytes, int] = {}
         self._rest = b""
         self._passed = 0
         self._listener: Any = None
-        self.total = 0
-        """Refusals counted so far."""
         sys.stdout.flush()
         self._log = os.dup(1)
         self._pipe, end = os.pipe()
@@ -158,10 +160,18 @@ class RefusalCounter:
         """Notice links of ``session`` whose certificate is genuine but has no rights here."""
         self._listener = session.info.declare_link_events_listener(self._linked, history=True)
 
-    def poll(self) -> list[Refusal]:
-        """What was refused since the last call, the most frequent first; does not wait."""
+    def poll(self, last: bool = False) -> list[Refusal]:
+        """What was refused since the last call, the most frequent first; does not wait.
+
+        Of a process whose link is not known yet it is told at a later call. ``last``: there is none.
+        """
         self.drain()
+        now = time.monotonic()
         with self._lock:
+            for (reason, zid), (times, since) in list(self._nameless.items()):
+                if last or zid in self._of_zid or now - since > _NAMELESS:
+                    del self._nameless[reason, zid]
+                    self._count(reason, self._of_zid.get(zid, zid), times)
             fresh, self._fresh = self._fresh, collections.Counter()
         return [Refusal(*what, count) for what, count in fresh.most_common()]
 
@@ -182,7 +192,7 @@ class RefusalCounter:
             self._listener.undeclare()
         self._give_back()
         os.dup2(self._log, 1)
-        left = self.poll()
+        left = self.poll(last=True)
         os.close(self._log)
         os.close(self._pipe)
         return left
@@ -207,11 +217,17 @@ class RefusalCounter:
                 address = link.dst.rpartition(":")[0].partition("/")[2]
                 self._count("has no rights here", f"{name or 'somebody'} at {address}")
 
-    def _count(self, reason: str, who: str) -> None:
+    def _count(self, reason: str, who: str, times: int = 1) -> None:
         kind = (reason, who)
         # Reasons hold keys, which an attacker may choose.
-        self._fresh[kind if kind in self._fresh or len(self._fresh) < _MOST else _OTHERS] += 1
-        self.total += 1
+        self._fresh[kind if kind in self._fresh or len(self._fresh) < _MOST else _OTHERS] += times
+
+    def _count_nameless(self, reason: str, zid: str) -> None:
+        times, since = self._nameless.get((reason, zid), (0, time.monotonic()))
+        if times or len(self._nameless) < _MOST:
+            self._nameless[reason, zid] = (times + 1, since)
+        else:
+            self._count(*_OTHERS)
 
     def _read(self, line: bytes) -> None:
         if b"is authorized to" in line and b"Using cached" in line:
@@ -251,9 +267,13 @@ class RefusalCounter:
         subject = _COMMON_NAME.search(denied["subject"] or b"")
         zid = denied["zid"].decode()
         with self._lock:
-            who = subject[1].decode(errors="replace") if subject else self._of_zid.get(zid, zid)
+            who = subject[1].decode(errors="replace") if subject else self._of_zid.get(zid)
             what, key = denied["what"].decode(errors="replace"), denied["key"].decode(errors="replace")
-            self._count(f"may not {_DEEDS.get(what, what.lower())} {key[:_SHOWN]}", who)
+            reason = f"may not {_DEEDS.get(what, what.lower())} {key[:_SHOWN]}"
+            if who is None:
+                self._count_nameless(reason, zid)
+            else:
+                self._count(reason, who)
 
 
 def _writes_to(stream: Any, descriptor: int) -> bool:
@@ -285,7 +305,7 @@ class RefusalTexts:
         now = time.monotonic()
         if now < self._due and not last:
             return []
-        texts = [refusal.text for refusal in self._counter.poll()]
+        texts = [refusal.text for refusal in self._counter.poll(last)]
         if self.door is not None and self.door.dropped > self._dropped:
             texts.append(f"mesh: {self.door.dropped - self._dropped} packets from unknown addresses dropped")
             self._dropped = self.door.dropped

@@ -8,6 +8,7 @@ import sys
 import time
 import traceback
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from ftcc.link.mesh import Mesh, configuration, import_zenoh
@@ -16,6 +17,12 @@ from ftcc.link.mesh_refusals import _MOST, RefusalCounter
 from ftcc.link.mesh_security import Credentials, Rights, lead_access, node_access, security, uav_access
 
 SWARM = "run"
+
+_DENIED = (
+    "2026-01-01T00:00:00.000000Z TRACE app-0 ThreadId(02) zenoh::net::routing::interceptor::access_control: "
+    "Using cached result: ab is unauthorized to Put (ingress) on {key}\n"
+)
+"""A line of Zenoh's log."""
 
 
 class Peer:
@@ -158,6 +165,14 @@ class Peer:
                 return [[*what, count] for what, count in found.items()]
             time.sleep(0.01)
 
+    def refused_before_its_link(self, key: str, name: str) -> list[list[list[Any]]]:
+        """What is told of a refusal that Zenoh logs first, and of whose link it tells then: before and after that."""
+        os.write(1, _DENIED.format(key=key).encode())
+        before = self.refusals.poll()
+        link = SimpleNamespace(zid="ab", auth_identifier=name, dst="tls/127.0.0.1:7")
+        self.refusals._linked(SimpleNamespace(kind="SampleKind.PUT", link=link))
+        return [[list(one) for one in some] for some in (before, self.refusals.poll())]
+
     def publish_many(self, count: int) -> None:
         for n in range(count):
             self.mesh.publish(f"{n}{' ' * 100}".encode())
@@ -166,16 +181,11 @@ class Peer:
         """Lines as Zenoh writes them, of keys that an attacker chooses: kinds of refusals, all of them, the limit."""
         kinds = total = 0
         for first in range(0, lines, 500):
-            text = "".join(
-                "2026-01-01T00:00:00.000000Z TRACE app-0 ThreadId(02) "
-                "zenoh::net::routing::interceptor::access_control: "
-                f"Using cached result: ab is unauthorized to Put (ingress) on ftcc/run/{n}\n"
-                for n in range(first, first + 500)
-            ).encode()
+            text = "".join(_DENIED.format(key=f"ftcc/run/{n}") for n in range(first, first + 500)).encode()
             while text:
                 text = text[os.write(1, text) :]
                 self.refusals.drain()
-        for one in self.refusals.poll():
+        for one in self.refusals.poll(last=True):
             kinds, total = kinds + 1, total + one.times
         return [kinds, total, _MOST]
 

@@ -115,6 +115,14 @@ def test_a_certificate_of_another_uav_links_but_is_neither_heard_nor_told(start,
     assert not one("wait_until_ready", seconds=0.0)
 
 
+def test_who_was_refused_is_named_also_if_zenoh_tells_of_its_link_later(start, keys):
+    one = start()
+    one("open", keys=str(keys / "good"), name="uav-1", own=1, hears=[], heard_by=[7], listen=free_port())
+    before, after = one("refused_before_its_link", key="ftcc/run/3/shared", name="uav-7")
+    assert before == []
+    assert after == [["may not put ftcc/run/3/shared", "uav-7", 1]]
+
+
 def test_a_neighbour_that_puts_what_is_anothers_is_not_heard_but_named_and_counted(start, keys):
     """Even where Zenoh's sender does send: the receiver lets it know what it listens to."""
     one, seven = start(), start()
