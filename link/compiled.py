@@ -96,8 +96,8 @@ def _compiled(function: F, **options: Any) -> F:
     function.__qualname__ = f"{function.__module__}.{function.__qualname__}"
     if numba.config.DISABLE_JIT:
         return function
-    settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False} | options
-    made = _Compiled(function, targetoptions=settings)
+    settings = {"nopython": True, "error_model": "numpy", "forceinline": True, "_nrt": False, "no_cfunc_wrapper": True}
+    made = _Compiled(function, targetoptions=settings | options)
     made.enable_caching()
     return made
 
@@ -128,15 +128,13 @@ class _Compiled(_InTurn):
         )
         within.__qualname__ = f"{function.__qualname__}-within"  # names its files in the cache
         within.__module__ = function.__module__
-        self._within = _InTurn(
-            within, targetoptions=targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        )
-        self._within.enable_caching()
+        self.within = _InTurn(within, targetoptions=targetoptions | {"no_cpython_wrapper": True})
+        self.within.enable_caching()
 
     @property
     def _numba_type_(self) -> Any:
         """What compiled functions see where they name this one."""
-        return self._within._numba_type_
+        return self.within._numba_type_
 
 
 def is_kept(function: Any) -> bool:
@@ -187,10 +185,11 @@ def entry_of(function: Any, *arguments: Any) -> Any:
 
 
 def refusal(function: Any, *arguments: Any) -> str:
-    """Compile ``function`` for the types of ``arguments``, without calling it: why numba refuses, "" if it does not."""
+    """Compile ``function`` for compiled callers that pass ``arguments`` of these types: why numba refuses, or ""."""
     if isinstance(function, Dispatcher):
+        called = function.within if isinstance(function, _Compiled) else function
         try:
-            function.compile(tuple(numba.typeof(argument) for argument in arguments))
+            called.compile(tuple(numba.typeof(argument) for argument in arguments))
         except Exception as error:  # numba raises more than its own errors
             return reason_of(str(error)) or repr(error)
     return ""

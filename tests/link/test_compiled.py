@@ -141,7 +141,7 @@ def test_of_processes_that_need_the_same_function_at_once_one_compiles_it(tmp_pa
         "print('ready', flush=True)\n"
         "sys.stdin.readline()\n"
         "both(np.zeros(3))\n"
-        "print(*(sum(one.stats.cache_misses.values()) for one in (both, copy._within)))\n"
+        "print(*(sum(one.stats.cache_misses.values()) for one in (both, copy.within)))\n"
     )
     environment = {**os.environ, "FTCC_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
     command = [sys.executable, str(tmp_path / "own.py")]
@@ -195,7 +195,7 @@ def test_only_what_python_calls_gets_what_unpacks_its_objects():
         pytest.skip("plain Python has no such functions")
     assert shifted.signatures == []
     assert shifted(values, 2.0) == 3.0  # a call from Python compiles it for Python
-    for function, unpacks in ((shifted._within, False), (shifted, True)):
+    for function, unpacks in ((shifted.within, False), (shifted, True)):
         (made,) = function.overloads.values()
         unpacking = made.library.get_pointer_to_function(made.fndesc.llvm_cpython_wrapper_name)
         assert bool(unpacking) is unpacks
