@@ -30,7 +30,7 @@ MESSAGES = {
 }
 RANDOM = 1500
 """Random messages of each kind."""
-MUTATED = 20_000
+MUTATED = 10_000
 """Datagrams."""
 _SPECIAL = np.array([0.0, -0.0, 1e-45, -1e-40, 3.4028235e38, -3.4028235e38, 1.0], np.float32)
 _POISON = 0xA5

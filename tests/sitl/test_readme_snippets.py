@@ -76,6 +76,7 @@ NOT_RUN = {
     "mavtogpx.py": "is pymavlink's: tests/sitl/test_log.py",
     "mavlogdump.py": "is pymavlink's: tests/sitl/test_log.py",
     "ftcc fly tests/example_scheme": "compiles a package for its own cache: tests/test_example_scheme.py",
+    "ftcc simulate tests/example_scheme": "likewise",
     "ftcc fly jsbsim_containment": "compiles as long for what tests/sitl/test_schemes.py flies",
     "ftcc map attitude_synchronization": "compiles a law; the other map of the page shows the same command",
     "ftcc fly jsbsim_attitude": "compiles a minute for what tests/sitl/test_schemes.py shows on another law",

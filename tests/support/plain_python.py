@@ -15,8 +15,8 @@ from ftcc.groundside import load, resolve
 from ftcc.groundside.scenario.loading import forms_and_variants, read, shipped
 from ftcc.groundside.simulation import fly_in_memory
 
-_TWINS = {"jsbsim_attitude": "jsbsim_containment"}
-"""Scenarios whose plant another one flies already: not compiled once more for this."""
+_TWINS = {"jsbsim_attitude": "jsbsim_containment", "jsbsim_fire": "jsbsim_containment"}
+"""Scenarios whose law and whose aircraft others fly already: not compiled once more for this."""
 CASES = [
     (name, form) for name, path in shipped().items() if name not in _TWINS for form in forms_and_variants(read(path))[0]
 ]
