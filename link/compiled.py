@@ -117,8 +117,8 @@ class _InTurn(CPUDispatcher):  # type: ignore[misc]
 class _Compiled(_InTurn):
     """A compiled function that other compiled functions call without what it needs to be called from Python.
 
-    numba adds to every function two more that unpack Python's objects. For a tuple of many arrays they are longer than
-    the function itself: half of all that was compiled, for functions that Python hardly ever calls.
+    That unpacks Python's objects. For a tuple of many arrays it is longer than the function itself, which Python hardly
+    ever calls.
     """
 
     def __init__(self, function: Any, targetoptions: dict[str, Any]) -> None:
