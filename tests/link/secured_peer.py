@@ -166,7 +166,7 @@ class Peer:
             time.sleep(0.01)
 
     def refused_before_its_link(self, key: str, name: str) -> list[list[list[Any]]]:
-        """What is told of a refusal that Zenoh logs first, and of whose link it tells then: before and after that."""
+        """What is told of a refusal before Zenoh tells of the link on which it was, and what after."""
         os.write(1, _DENIED.format(key=key).encode())
         before = self.refusals.poll()
         link = SimpleNamespace(zid="ab", auth_identifier=name, dst="tls/127.0.0.1:7")
