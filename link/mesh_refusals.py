@@ -41,8 +41,9 @@ _SHOWN = 100
 _CACHED = 9
 """Decisions that Zenoh takes in advance, and logs like refusals, when it first meets a key."""
 
-_NAMELESS = 2.0
+_NAMED_WITHIN = 2.0
 """How long a refusal waits for the name of its link, s of wall time: Zenoh tells of both in either order."""
+
 _PERIOD, _LONGEST_PERIOD = 2.5, 320.0
 """Wall time between two reports, at first and in a flood, s."""
 
@@ -169,7 +170,7 @@ class RefusalCounter:
         now = time.monotonic()
         with self._lock:
             for (reason, zid), (times, since) in list(self._nameless.items()):
-                if last or zid in self._of_zid or now - since > _NAMELESS:
+                if last or zid in self._of_zid or now - since > _NAMED_WITHIN:
                     del self._nameless[reason, zid]
                     self._count(reason, self._of_zid.get(zid, zid), times)
             fresh, self._fresh = self._fresh, collections.Counter()
