@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ftcc.link.failures import Size
 
-__all__ = ["ATTACK_SIZES", "KINDS", "LONGEST", "Kind", "attack_text", "kind_of"]
+__all__ = ["ATTACK_SIZES", "DRIFT_TIME", "KINDS", "LONGEST", "Kind", "attack_text", "kind_of", "with_rate"]
 
 
 class Kind(NamedTuple):
@@ -60,6 +60,16 @@ KINDS: dict[str, Kind] = {
 
 LONGEST = 16384
 """Records that a replay can look back."""
+
+DRIFT_TIME = 10.0
+"""Time in which a drift whose rate is not given comes to its size, s: slow enough to be believed."""
+
+
+def with_rate(kind: str, sizes: Mapping[str, float]) -> dict[str, float]:
+    """The sizes of a lie; of a drift that has a ``size`` alone with the rate that takes it there in `DRIFT_TIME`."""
+    slowly = {"rate": sizes["size"] / DRIFT_TIME} if kind == "drift" and "size" in sizes else {}
+    return {**slowly, **sizes}
+
 
 _ANY = 1e6
 

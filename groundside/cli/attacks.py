@@ -21,7 +21,9 @@ def attack(
         str | None, typer.Option(metavar="A,B", help="Shared values that are false; default: all that are no rates.")
     ] = None,
     size: Annotated[float | None, typer.Option(help="Size, in the unit of the signal; collude: the target.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Rate of a drift or of a target, unit per s.")] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="Rate of a drift or of a target, unit per s; default of a drift: size / 10 s.")
+    ] = None,
     period: Annotated[float | None, typer.Option(help="Period, or window that is replayed, s.")] = None,
     delay: Annotated[float | None, typer.Option(help="How far back a replay looks, s.")] = None,
     onset: Annotated[float | None, typer.Option(help="Time in which collude comes to its target, s.")] = None,

@@ -17,6 +17,7 @@ from typing import Self
 
 from ftcc.groundside.swarm.conversation import Conversation, NoAnswerError, RefusedError, StationError, as_float32
 from ftcc.link.attacks import KINDS as KINDS_OF_LIES
+from ftcc.link.attacks import with_rate
 from ftcc.link.failures import KINDS, UNITS, parameter_of
 from ftcc.link.flight_modes import code_of, mode_called
 from ftcc.link.mavlink import AUTOPILOT, dialect
@@ -284,7 +285,7 @@ class Station(Conversation):
         signals : names of what is false; by default all shared values that are no rates.
         consistent : False: rates stay true.
         at, until : simulated times, s; None: now, never.
-        sizes : ``size``, ``rate``, ``period``, ``delay``, ``onset``: what the kind needs.
+        sizes : ``size``, ``rate``, ``period``, ``delay``, ``onset``: what the kind needs. See `with_rate`.
 
         Returns
         -------
@@ -295,7 +296,7 @@ class Station(Conversation):
         ------
         NoAnswerError, RefusedError
         """
-        given = sizes | ({} if victim is None else {"as": float(victim)})
+        given = with_rate(kind, sizes) | ({} if victim is None else {"as": float(victim)})
         check_attack(kind, given)
         if kind == "none" and (until is not None or signals):
             raise StationError("none: ends every lie, and takes no until and no signals")

@@ -50,6 +50,18 @@ def test_a_lie_is_told_logged_and_ended(both: tuple[Bench, Station]) -> None:
     ]
 
 
+def test_a_drift_of_a_size_alone_comes_there_in_ten_seconds(both: tuple[Bench, Station]) -> None:
+    bench, station = both
+    said(bench)
+    station.attack(1, "drift", size=-2.0, at=0.05)
+    station.attack(1, "drift", size=2.0, rate=0.5, at=0.05)
+    texts = [event.text for event in said(bench) if event.outcome == "armed"]
+    assert [text.partition(" at t")[0] for text in texts] == [
+        "lies: drift: rate -0.2, size -2",
+        "lies: drift: rate 0.5, size 2",
+    ]
+
+
 def test_a_new_lie_replaces_the_one_before_and_none_ends_it(both: tuple[Bench, Station]) -> None:
     bench, station = both
     station.attack(1, "drift", rate=-0.5)
@@ -126,6 +138,7 @@ def test_signals_are_called_by_their_names(both: tuple[Bench, Station], tmp_path
     [
         ("lie", {}, "no such kind; there are offset, drift"),
         ("offset", {}, "needs size"),
+        ("drift", {}, "needs rate"),
         ("freeze", {"size": 1.0}, "takes no size; its sizes: none"),
         ("freeze", {"to": 6}, "UAV 6 does not hear UAV 1; nobody does"),
         ("freeze", {"at": 2.0, "until": 1.0}, "must be later than the beginning"),
